@@ -208,7 +208,7 @@ fn is_whole_page(html: &Path) {
     for word in [
         "<svg",
         "<details><summary>backlash X",
-        "What can be told from what",
+        "Effects that look alike in this recording",
         "prefers-color-scheme",
     ] {
         assert!(page.contains(word), "{word}");

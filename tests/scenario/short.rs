@@ -111,7 +111,7 @@ fn diagnoses_take_forty_lines_and_explain_prints_all() {
         for title in [
             table,
             "Effects that this recording could not show",
-            "What can be told from what",
+            "Effects that look alike in this recording",
             "Conditions of the measurement",
         ] {
             assert!(whole.lines().any(|line| line == title), "{title}: {whole}");

@@ -57,6 +57,22 @@ pub fn named<'r>(report: &'r Value, effect: &str, axis: &str) -> &'r Value {
         .unwrap_or_else(|| panic!("{effect} {axis} is not named in {causes:#?}"))
 }
 
+/// A parameter in words: its key without the unit.
+fn label_of(name: &str) -> String {
+    let units = [
+        "_um_per_h",
+        "_um_per_m",
+        "_um_per_k",
+        "_um",
+        "_urad",
+        "_ms",
+        "_min",
+        "_s",
+    ];
+    let label = units.iter().find_map(|unit| name.strip_suffix(unit));
+    label.unwrap_or(name).replace('_', " ")
+}
+
 /// A person reads of the named cause: what it is, where, its size with the interval, and how far the gap shrinks.
 ///
 /// `title` is the effect in words with what it acts on; the text is a terminal's or that of a page.
@@ -71,7 +87,7 @@ pub fn is_told(text: &str, report: &Value, (effect, axis): (&str, &str), title: 
         assert!(all, "{what}: {shown:?}, in the report {values:?}");
     };
     let which = sentence(text, "Which:");
-    let said: [f64; 3] = numbers_after(which, &format!("{title} ({name} = "));
+    let said: [f64; 3] = numbers_after(which, &format!("{title} ({} ", label_of(name)));
     same(&said, &in_report, which);
     let table = &text[text.find("key of the machine file").unwrap()..];
     let row = &table[table.find(title).unwrap()..];

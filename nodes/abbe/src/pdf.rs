@@ -149,10 +149,7 @@ fn print(mut browser: Command, page: &str, head: &Head, longest: Duration) -> Re
     let name = browser.get_program().to_string_lossy().into_owned();
     let home = Vanishing::temporary().context("folder for the browser")?;
     let file = |name: &str| home.path().join(name);
-    // Paper has nothing to fold: every part stands open.
-    let open = page.replace("<details>", "<details open>");
-    let open = open.replace("<details class", "<details open class");
-    let styled = open.replacen("</head>", &format!("{}</head>", head.style()), 1);
+    let styled = unfolded(page).replacen("</head>", &format!("{}</head>", head.style()), 1);
     std::fs::write(file("page.html"), styled).context("page for the browser")?;
     let messages = File::create(file("messages")).context("messages of the browser")?;
     browser
@@ -184,6 +181,17 @@ fn print(mut browser: Command, page: &str, head: &Head, longest: Duration) -> Re
         bail!("{name} wrote no PDF: {}", reason());
     }
     Ok(bytes)
+}
+
+/// Paper has nothing to fold: every part stands open, as a section whose head stays with what follows it. A browser keeps the
+/// summary of a `details` apart from its content at the foot of a sheet.
+fn unfolded(page: &str) -> String {
+    let parts = page
+        .replace("<details", "<section")
+        .replace("</details>", "</section>");
+    parts
+        .replace("<summary>", "<div class=\"summary\">")
+        .replace("</summary>", "</div>")
 }
 
 /// Waits for the end of a process; one that takes too long is killed with its group. Helpers of its own may outlive it, and
@@ -258,6 +266,15 @@ mod tests {
             let error = format!("{:#}", printed(&text, long).unwrap_err());
             assert!(error.contains(words), "{error}");
         }
+    }
+
+    #[test]
+    fn a_part_stands_open_and_its_head_stays_with_it() {
+        let page = "<details class=\"part\"><summary><h2>Causes</h2></summary><p>x</p></details>";
+        assert_eq!(
+            unfolded(page),
+            "<section class=\"part\"><div class=\"summary\"><h2>Causes</h2></div><p>x</p></section>"
+        );
     }
 
     #[test]

@@ -120,7 +120,7 @@ impl ReportBag {
         let title = match &table {
             // The folders of a table are no part of its name.
             Some(_) => format!("Tests in the table {}", file_name(&self.bag)),
-            None => format!("Tests in {}", self.bag.display()),
+            None => title_of(&tests, &self.bag),
         };
         let (mut report, alarms) = self.judged(&title, &tests, budget.as_ref(), limits)?;
         if let Some(table) = &table {
@@ -231,6 +231,14 @@ impl ReportBag {
             self.keep.report(&report.figures, origin)?;
         }
         Ok(())
+    }
+}
+
+/// The title of a page of tests: the machine, whose path is among the data below it.
+fn title_of(tests: &Tests, bag: &Path) -> String {
+    match tests.machine.as_ref().map(|machine| machine.name.as_str()) {
+        Some(name) if !name.is_empty() => format!("Tests of {name}"),
+        _ => format!("Tests in {}", bag.display()),
     }
 }
 

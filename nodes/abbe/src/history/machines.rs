@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::{Result, bail};
 use history::{Fleet, LEAST_MACHINES, Last, SeriesKey, Store, Window, fleet};
 use reports::section::{Rows, Section, head};
+use reports::terminal::Rank;
 use serde_json::json;
 
 use super::dates::{date, time};
@@ -17,7 +18,7 @@ use super::view::{Line, Page, SCHEMA};
 /// When the store cannot be read.
 pub fn list(store: &Store) -> Result<Page> {
     let all = store.machines()?;
-    let mut section = Section::new("Machines");
+    let mut section = Section::new("Machines").ranked(Rank::Answer);
     if all.is_empty() {
         section.lines.push("The history is empty.".to_owned());
     }

@@ -8,6 +8,7 @@ use history::{
     due, latest_until,
 };
 use reports::section::{Rows, Section, head};
+use reports::terminal::Rank;
 use serde_json::{Value, json};
 
 use super::dates::{DAY_S, Moment, date, time};
@@ -28,7 +29,7 @@ pub fn of(
     every_days: Option<f64>,
     window: Window,
 ) -> Result<Page> {
-    let mut figures = Section::new("Figures");
+    let mut figures = Section::new("Figures").ranked(Rank::Answer);
     let (mut values, mut list, mut rows) = (Vec::new(), Vec::new(), Vec::new());
     for series in chosen(store, key)? {
         let kept = store.points(series.id, window)?;
@@ -134,7 +135,7 @@ fn due_tests(
     let rank = |due: &Due| due.due_s.unwrap_or(f64::INFINITY);
     all.sort_by(|(_, a), (_, b)| rank(a).total_cmp(&rank(b)));
     let is_due = |due: &Due| due.due_s.is_some_and(|due_s| due_s <= now_s);
-    let mut section = Section::new("Tests");
+    let mut section = Section::new("Tests").ranked(Rank::Answer);
     let row = |(test, due): &(String, Due)| {
         let dash = || "—".to_owned();
         vec![
@@ -191,7 +192,7 @@ pub fn changes(
         rows.push(row);
         list.push(entry);
     }
-    let mut section = Section::new("Changes");
+    let mut section = Section::new("Changes").ranked(Rank::Answer);
     if n_alone > 0 {
         section.lines.push(format!(
             "{n_alone} figures have no value up to the first date."

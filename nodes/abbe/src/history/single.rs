@@ -5,7 +5,8 @@ use history::{
     ChangePoint, Crossing, Kept, Limit, Point, SURE, Series, Side, Store, Trend, Window, YEAR_S,
     change_points, crossing, since_last_change,
 };
-use reports::plot::{self, Plot, Trace};
+use reports::plot::{self, Band, Plot, Trace};
+use reports::screen::Tile;
 use reports::section::{Drawing, Rows, Section, head};
 use serde_json::{Value, json};
 
@@ -83,6 +84,14 @@ pub fn of(
         section.lines.push(limit_line(*limit, found, shown));
         crossings.push(limit_json(kept_limit, found));
     }
+    // The limits decide; without them the trend.
+    let n_limits = limits.len();
+    let decides = match n_limits {
+        0 => trend_line(&evaluated).into_iter().next(),
+        n => section.lines.get(section.lines.len() - n).cloned(),
+    };
+    section.answers.extend(decides);
+    section.tile = tile(&section.title, &evaluated);
     section.tables.push(rows(&kept, shown));
     if evaluated.points.len() > 1 {
         section.drawings.push(drawing(series, &evaluated, limits)?);
@@ -95,6 +104,26 @@ pub fn of(
         source: one.source,
     };
     Ok((section, json, kept.into_iter().map(line).collect()))
+}
+
+/// The last value with U, and its change per year.
+fn tile(title: &str, evaluated: &Evaluated) -> Option<Tile> {
+    let last = evaluated.points.last()?;
+    let shown = &evaluated.shown;
+    let half_width = COVERAGE_FACTOR * last.standard_uncertainty.unwrap_or(0.0);
+    let trend = evaluated.trend.as_ref().map_or_else(String::new, |trend| {
+        let slope = shown.with_half_width(
+            trend.slope_per_s * YEAR_S,
+            trend.slope_half_width_per_s() * YEAR_S,
+        );
+        format!("; {slope} per year (95 %)")
+    });
+    let more = format!("last value, of {} (k = 2){trend}", date(last.at_s));
+    Some(Tile::new(
+        title,
+        shown.with_half_width(last.value, half_width),
+        more,
+    ))
 }
 
 fn summary(evaluated: &Evaluated) -> Option<String> {
@@ -247,6 +276,7 @@ fn drawing(series: &Series, evaluated: &Evaluated, limits: &[Limit]) -> Result<D
         marks,
     };
     let mark = |point: &Point| (day(point.at_s), point.value * shown.factor);
+    let mut bands = Vec::new();
     let mut traces = vec![trace(
         "values",
         points.iter().step_by(every).map(mark).collect(),
@@ -255,15 +285,19 @@ fn drawing(series: &Series, evaluated: &Evaluated, limits: &[Limit]) -> Result<D
     if let Some(trend) = &evaluated.trend {
         let along = |offset: f64| {
             let at = |k: u32| {
-                let at_s = trend.first_s + f64::from(k) / 20.0 * (trend.last_s - trend.first_s);
+                let at_s = trend.first_s + f64::from(k) / 30.0 * (trend.last_s - trend.first_s);
                 let value = trend.value_at(at_s) + offset * trend.half_width_at(at_s);
                 (day(at_s), value * shown.factor)
             };
-            (0..=20).map(at).collect::<Vec<_>>()
+            (0..=30).map(at).collect::<Vec<_>>()
         };
+        let ends = along(-1.0).into_iter().zip(along(1.0));
+        bands.push(Band {
+            name: "95 % of the trend".to_owned(),
+            of: traces.len(),
+            points: ends.map(|((at, low), (_, high))| (at, low, high)).collect(),
+        });
         traces.push(trace("trend", along(0.0), false));
-        traces.push(trace("95 % above", along(1.0), false));
-        traces.push(trace("95 % below", along(-1.0), false));
     }
     for limit in limits {
         let ends = [0.0, day(last_s)].map(|at| (at, limit.value));
@@ -274,11 +308,12 @@ fn drawing(series: &Series, evaluated: &Evaluated, limits: &[Limit]) -> Result<D
     } else {
         &shown.unit
     };
-    let svg = plot::svg(&Plot {
+    let plot = Plot {
         x: format!("days since {}", date(first_s)),
         y: format!("{} / {unit}", series.name),
         traces,
-    })?;
+    };
+    let svg = plot::banded_svg(&plot, &bands)?;
     Ok(Drawing {
         svg,
         caption: "Each value, and the trend since the last sure change with its 95 % interval."

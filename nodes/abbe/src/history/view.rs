@@ -9,7 +9,9 @@ use history::{Limit, Options, Series, SeriesKey, Side, Store, Window};
 use maud::html;
 use metrology::number::number;
 use reports::loss;
-use reports::section::Section;
+use reports::page::figure;
+use reports::screen::{Screen, Tone};
+use reports::section::{Section, capitalised};
 use reports::whole_file::{self, Form, Output, check_outputs};
 use serde_json::{Value, json};
 
@@ -143,7 +145,7 @@ impl View {
         }
         if let Some(path) = &self.html {
             let body = html! {
-                h1 { (page.title) }
+                (screen(&page.sections).html(&page.title))
                 @for section in &page.sections { (section.html()) }
             };
             whole_file::write(path, &reports::html(&page.title, &body))?;
@@ -280,6 +282,30 @@ impl View {
             }
         }
         Ok(page)
+    }
+}
+
+/// The first screen: what decides, the last values, and the first plot.
+fn screen(sections: &[Section]) -> Screen {
+    let answered = sections
+        .iter()
+        .find_map(|section| Some((section, section.answers.first()?)));
+    let drawn = sections
+        .iter()
+        .find_map(|section| Some((section, section.drawings.first()?)));
+    Screen {
+        verdict: answered.map(|(section, answer)| {
+            let sentence = format!("{}: {answer}", section.title);
+            (capitalised(&sentence), Tone::Plain)
+        }),
+        tiles: { sections.iter() }
+            .filter_map(|section| section.tile.clone())
+            .collect(),
+        picture: drawn.map(|(section, drawing)| {
+            let caption = format!("{}. {}", section.title, drawing.caption);
+            figure(&drawing.svg, &caption)
+        }),
+        ..Screen::default()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use maud::html;
+use maud::{Markup, html};
 use reports::evaluate::Tests;
 use reports::evaluate::limits::CONFORMS;
 use reports::loss;
@@ -11,6 +11,8 @@ use reports::screen::{Screen, Tile, Tone};
 use reports::section::Section;
 use reports::terminal::Rank;
 
+/// What a verdict without limits says.
+const NOT_JUDGED: &str = "Not judged: no limits were given.";
 /// Most tiles of answers.
 const MOST_ANSWERS_ON_TILES: usize = 4;
 
@@ -30,37 +32,105 @@ pub(super) fn of(
         all.sort_by_key(|one| one.rank);
         all
     };
-    let tiles = answered()
-        .into_iter()
+    let shown = worst_of_circles(answered());
+    let tiles = { shown.iter() }
         .take(MOST_ANSWERS_ON_TILES)
-        .map(tile)
-        .collect();
-    let drawn = { answered().into_iter() }
-        .chain(sections)
-        .find_map(|one| Some((&one.title, one.drawings.first()?)));
+        .map(|one| tile(one));
+    let tiles = tiles.collect();
     Screen {
-        verdict: verdict(tests, &answered(), judged),
+        verdict: verdict(tests, &shown, judged),
         tiles,
         lacks: lacks(tests, sections, stated),
-        picture: drawn.map(|(title, drawing)| {
-            let caption = format!("{title}. {}", drawing.caption);
-            html! { (figure(&drawing.svg, &caption)) }
-        }),
+        picture: picture(&shown, sections),
         ..Screen::default()
     }
 }
 
+/// The parts without the circles that another of their plane exceeds, each worst circle followed by the causes of its plane.
+fn worst_of_circles(answered: Vec<&Section>) -> Vec<&Section> {
+    let is_worst = |one: &&Section| {
+        let Some(own) = circular_error_mm(one) else {
+            return true;
+        };
+        let is_rival = |other: &&&Section| plane_of(other) == plane_of(one);
+        let mut rivals = { answered.iter() }
+            .filter(is_rival)
+            .filter_map(|other| circular_error_mm(other));
+        rivals.all(|other| other <= own)
+    };
+    let mut shown: Vec<&Section> = answered.iter().copied().filter(is_worst).collect();
+    // A stable sort: the part of the causes moves behind the circles alone.
+    shown.sort_by_key(|one| (one.rank, !is_of_circles(one)));
+    shown
+}
+
+fn is_of_circles(section: &Section) -> bool {
+    !section.figures["iso230_4"].is_null() || !section.figures["breakdown"].is_null()
+}
+
+/// Such as `Circle XY` with its state of compensation.
+fn plane_of(section: &Section) -> (&str, &str) {
+    let (title, state) = section
+        .title
+        .split_once(": ")
+        .unwrap_or((section.title.as_str(), ""));
+    (title.split(',').next().unwrap_or(title), state)
+}
+
+/// The greatest circular error of a circle's part, mm.
+fn circular_error_mm(section: &Section) -> Option<f64> {
+    let of = |who: &str| section.figures["iso230_4"][who]["circular_error"]["value_mm"].as_f64();
+    let all = ["both", "clockwise", "counter_clockwise"].into_iter();
+    all.filter_map(of).reduce(f64::max)
+}
+
+/// The first drawing, beside that of the causes where it is of a circle.
+fn picture(shown: &[&Section], sections: &[Section]) -> Option<Markup> {
+    let mut all = shown.iter().copied().chain(sections);
+    let (section, drawing) = all.find_map(|one| Some((one, one.drawings.first()?)))?;
+    let caption = format!("{}. {}", section.title, drawing.caption);
+    let first = figure(&drawing.svg, &caption);
+    let has_causes = |one: &&&Section| !one.figures["breakdown"].is_null();
+    let causes = shown
+        .iter()
+        .find(has_causes)
+        .filter(|_| circular_error_mm(section).is_some());
+    let beside = causes.and_then(|one| Some((one, one.drawings.first()?)));
+    let beside = beside.map(|(one, drawing)| {
+        let caption = format!("{}. {}", one.title, drawing.caption);
+        figure(&drawing.svg, &caption)
+    });
+    Some(match beside {
+        Some(beside) => html! { div.pair { (first) (beside) } },
+        None => first,
+    })
+}
+
 /// The answer of a part: the first number of its sentence large, the rest below.
 fn tile(section: &Section) -> Tile {
+    if let Some(tile) = &section.tile {
+        return tile.clone();
+    }
     let answer = section.answers.first().map_or("", String::as_str);
     let answer = answer.trim_end_matches('.');
     let (value, more) = answer.split_once(&[',', ';'][..]).unwrap_or((answer, ""));
     let more = more.trim_start();
     let title = section.title.split(':').next().unwrap_or_default();
+    let is_compensated = section.title.contains(": compensated");
+    let state = if is_compensated { ", compensated" } else { "" };
+    let title = &(without_place(title) + state);
     match figure_of(value) {
         Some((name, figure)) if more.is_empty() => Tile::new(title, figure, name),
         Some((name, figure)) => Tile::new(title, figure, format!("{name}; {more}")),
         None => Tile::new(title, value, more),
+    }
+}
+
+/// A title without the place of a circle, which a tile has no room for.
+fn without_place(title: &str) -> String {
+    match (title.split_once(" about ("), title.rsplit_once(')')) {
+        (Some((before, _)), Some((_, behind))) => format!("{before}{behind}"),
+        _ => title.to_owned(),
     }
 }
 
@@ -100,8 +170,20 @@ fn verdict(
         return Some((answer, tone));
     }
     let first = answered.first()?;
-    let answer = first.answers.first()?;
-    Some((format!("{}: {answer}", first.title), Tone::Plain))
+    let answer = first.answers.first()?.trim_end_matches('.');
+    let causes = answered
+        .iter()
+        .filter(|one| !one.figures["breakdown"].is_null());
+    let mut causes = causes.filter(|_| circular_error_mm(first).is_some());
+    let cause = causes.find_map(|one| one.tile.as_ref());
+    let cause = cause.map_or_else(String::new, |tile| {
+        format!("; {}: {}", tile.name, tile.value)
+    });
+    let title = without_place(first.title.trim_end_matches(": not compensated"));
+    Some((
+        format!("{title}: {answer}{cause}. {NOT_JUDGED}"),
+        Tone::Plain,
+    ))
 }
 
 fn lacks(tests: &Tests, sections: &[Section], stated: bool) -> Vec<String> {
@@ -158,13 +240,66 @@ mod tests {
         let (verdict, tone) = screen.verdict.clone().unwrap();
         assert_eq!(
             verdict,
-            "Space diagonals: Systematic deviation E_d 12.00 µm."
+            "Space diagonals: Systematic deviation E_d 12.00 µm. Not judged: no limits were given."
         );
         assert_eq!(tone, Tone::Plain);
         assert_eq!(screen.tiles[1].name, "Positioning X, run 1 on");
         assert_eq!(screen.tiles[1].value, "8.50 ± 0.40 µm");
         assert!(screen.tiles[1].more.starts_with("accuracy A; systematic"));
         assert_eq!(screen.lacks, ["Circle XY: Not evaluated: one sense only."]);
+    }
+
+    fn circle(title: &str, error_mm: f64) -> Section {
+        let answer = format!("circular error G of both senses {:.2} µm.", error_mm * 1e3);
+        let mut circle = section(title, &answer, Rank::Table);
+        circle.figures =
+            serde_json::json!({"iso230_4": {"both": {"circular_error": {"value_mm": error_mm}}}});
+        circle
+    }
+
+    #[test]
+    fn the_worst_circle_of_a_plane_and_its_largest_cause_come_first() {
+        let mut causes = section(
+            "Causes in XY, not compensated",
+            "Largest cause: play.",
+            Rank::Table,
+        );
+        causes.figures = serde_json::json!({"breakdown": {}});
+        causes.tile = Some(Tile::new(
+            "largest cause in XY",
+            "backlash X 5.0 ± 0.2 µm",
+            "",
+        ));
+        let all = [
+            circle(
+                "Circle XY, R 50.000 mm, 1500 mm/min about (0.0, 0.0, 30.0), runs 5 and 6: not compensated",
+                0.0108,
+            ),
+            circle(
+                "Circle XY, R 50.000 mm, 6000 mm/min about (0.0, 0.0, 30.0), runs 9 and 10: not compensated",
+                0.0132,
+            ),
+            section(
+                "Geometric errors",
+                "4 of 51 coefficients are known.",
+                Rank::Table,
+            ),
+            causes,
+        ];
+        let screen = of(&Tests::default(), &all, None, true);
+        assert_eq!(
+            screen.verdict.unwrap().0,
+            "Circle XY, R 50.000 mm, 6000 mm/min, runs 9 and 10: circular error G of both senses 13.20 µm; largest cause in XY: backlash X 5.0 ± 0.2 µm. Not judged: no limits were given."
+        );
+        let names: Vec<&str> = screen.tiles.iter().map(|tile| tile.name.as_str()).collect();
+        assert_eq!(
+            names,
+            [
+                "Circle XY, R 50.000 mm, 6000 mm/min, runs 9 and 10",
+                "largest cause in XY",
+                "Geometric errors"
+            ]
+        );
     }
 
     #[test]

@@ -121,9 +121,8 @@ fn conditions(evidence: &Evidence) -> Vec<String> {
     }
     if !gone.is_empty() {
         let names: Vec<String> = gone.iter().map(Told::whose).collect();
-        let n = gone.len();
         lines.push(format!(
-            "came and went, {n} warnings: {}; see the page",
+            "came and went: {}; their messages are among the conditions that nodes reported",
             names.join(", ")
         ));
     }
@@ -265,12 +264,16 @@ mod tests {
             (
                 "over after the program has ended",
                 [&start[..5], &[(150, "homing", Ok)]].concat(),
-                &["came and went, 1 warnings: controller (homing); see the page"],
+                &[
+                    "came and went: controller (homing); their messages are among the conditions that nodes reported",
+                ],
             ),
             (
                 "one returns in a program",
                 with(&[(70, "stop", Warn), (71, "stop", Ok)]),
-                &["came and went, 1 warnings: controller (stop); see the page"],
+                &[
+                    "came and went: controller (stop); their messages are among the conditions that nodes reported",
+                ],
             ),
             (
                 "one returns and stays",
@@ -285,12 +288,16 @@ mod tests {
             (
                 "one that comes when it was calm",
                 with(&[(60, "hot", Warn), (61, "hot", Ok)]),
-                &["came and went, 1 warnings: controller (hot); see the page"],
+                &[
+                    "came and went: controller (hot); their messages are among the conditions that nodes reported",
+                ],
             ),
             (
                 "one that comes after the program",
                 with(&[(150, "hot", Warn), (151, "hot", Ok)]),
-                &["came and went, 1 warnings: controller (hot); see the page"],
+                &[
+                    "came and went: controller (hot); their messages are among the conditions that nodes reported",
+                ],
             ),
         ];
         for (what, reported, wanted) in table {
@@ -329,7 +336,7 @@ mod tests {
                 "2 messages are not in the bag: they were lost on the way to it",
                 "axis_compensation (positioning run/X): warning, 2 times: run 4 gave no table",
                 "axis_compensation (geometry): error, over since: of another machine",
-                "came and went, 1 warnings: axis_compensation (model); see the page",
+                "came and went: axis_compensation (model); their messages are among the conditions that nodes reported",
             ]
         );
     }

@@ -1,12 +1,12 @@
 //! The diagnosis of simulator against machine, as a page: three answers first, tables and drawings after.
 
 use anyhow::Result;
-use gap_diagnosis::report::{Cause, GapReport, ParameterValue, Status};
+use gap_diagnosis::report::{Cause, GapReport, NextExperiment, ParameterValue, Status};
 use maud::html;
 
 use diagnosed::Diagnosed;
 use simulated::Simulated;
-use words::{covariate, name, signs};
+use words::{covariate, in_units, name, name_of, signs};
 
 use super::Report;
 use super::page::fold;
@@ -20,7 +20,8 @@ pub mod designed;
 pub mod diagnosed;
 mod drawings;
 mod first_screen;
-mod matrix;
+mod heat;
+mod look_alikes;
 pub mod planned;
 mod sentences;
 pub mod simulated;
@@ -51,11 +52,12 @@ pub fn page(title: &str, diagnosed: &Diagnosed, explain: bool) -> Result<Report>
     let sections = sections(diagnosed);
     let notes: Vec<String> = notes(diagnosed);
     let traces = drawings::traces(&figures.traces)?;
+    let look_alikes = look_alikes::section(&figures.isolability);
     let parts = explain
         .then(|| Part::of(&why::section(report)))
         .into_iter()
         .chain(sections.iter().map(Part::of))
-        .chain(matrix::section(&figures.isolability).as_ref().map(Part::of))
+        .chain(look_alikes.as_ref().map(Part::of))
         .chain(remarks(&notes));
     let parts = terminal::apart(parts);
     let mut screen = first_screen::of(report, &diagnosed.losses());
@@ -67,14 +69,14 @@ pub fn page(title: &str, diagnosed: &Diagnosed, explain: bool) -> Result<Report>
         parts,
         screen,
         body: html! {
-            (matrix::style())
+            (heat::style())
             @for line in &lines { p { (line) } }
             @for section in sections.iter().filter(|one| one.rank < Rank::Detail) { (section.html()) }
             (fold("Machine minus simulator, before and after", None, true, &compared))
             (why::folded(report))
-            (matrix::heat(&figures.heat))
+            (heat::heat(&figures.heat))
             @for section in sections.iter().filter(|one| one.rank == Rank::Detail) { (section.html()) }
-            (matrix::isolability(&figures.isolability))
+            @if let Some(section) = &look_alikes { (section.html()) }
         },
         figures: diagnosed.json()?,
         lines,
@@ -269,16 +271,22 @@ fn status(status: Status) -> &'static str {
 
 fn values(cause: &Cause) -> String {
     let value = |p: &ParameterValue| {
+        let (label, factor, unit) = in_units(spoken_key(&p.name), p.value);
+        let whole = if p.name.starts_with(WHOLE) {
+            " in all"
+        } else {
+            ""
+        };
         if p.determined == Some(false) {
-            return format!("{} {NOT_DETERMINED}", spoken(&p.name));
+            return format!("{label}{whole} {NOT_DETERMINED}");
         }
         let bound = if p.at_bound { ", at its bound" } else { "" };
+        let value = format!("{label}{whole} {} {unit}", three(p.value * factor));
         format!(
-            "{} = {} ({} to {}{bound})",
-            spoken(&p.name),
-            three(p.value),
-            three(p.low),
-            three(p.high)
+            "{} ({} to {}{bound})",
+            value.trim_end(),
+            three(p.low * factor),
+            three(p.high * factor)
         )
     };
     let all: Vec<String> = told(cause).map(value).collect();
@@ -291,6 +299,11 @@ fn told(cause: &Cause) -> impl Iterator<Item = &ParameterValue> {
     let all = cause.parameters.iter();
     let whole = all.clone().find_map(|p| p.name.strip_prefix(WHOLE));
     all.filter(move |p| !p.name.starts_with(FREE_FORM) && whole != Some(&p.name))
+}
+
+/// The key of a parameter without its mark of a sum.
+fn spoken_key(name: &str) -> &str {
+    name.strip_prefix(WHOLE).unwrap_or(name)
 }
 
 /// How people call a parameter.
@@ -453,11 +466,17 @@ fn held_out(diagnosed: &Diagnosed) -> Section {
     section
 }
 
+/// What an experiment separates, in words.
+fn separated(next: &NextExperiment) -> String {
+    let names: Vec<String> = next.separates.iter().map(|id| name_of(id)).collect();
+    names.join(" / ")
+}
+
 fn next(report: &GapReport) -> Section {
     let rows = report.next_experiments.iter().map(|next| {
         vec![
             next.run.clone(),
-            next.separates.join(" / "),
+            separated(next),
             three(next.delta),
             three(next.minutes),
         ]

@@ -5,6 +5,7 @@ use metrology::sample::{
 };
 use metrology::{ErrorComponent, squareness};
 
+use super::screen::Tile;
 use super::section::{Rows, Section, head, rounded, um};
 
 mod curves;
@@ -65,6 +66,10 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
         });
     }
     section.figures = figures(title, model, &all);
+    section.tile = largest(&known).map(|(value, more)| {
+        let more = format!("{more}; {}", count(&all, known.len()).trim_end_matches('.'));
+        Tile::new("largest known geometric error", value, more)
+    });
     match curves::drawings(model) {
         Ok(drawings) => section.drawings = drawings,
         Err(error) => section
@@ -72,6 +77,30 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
             .push(format!("The curves are not drawn: {error:#}.")),
     }
     section
+}
+
+/// The largest known shift, or turn where no shift is known, at the end of its span, with U; and where.
+fn largest(known: &[&Coefficient]) -> Option<(String, String)> {
+    let of = |is_angular: bool| {
+        let own = { known.iter() }.filter(move |c| c.curve.component.is_angular() == is_angular);
+        own.filter(|c| c.at_end().is_finite())
+            .max_by(|a, b| a.at_end().abs().total_cmp(&b.at_end().abs()))
+    };
+    let largest = of(false).or_else(|| of(true))?;
+    let row = largest.row();
+    let [name, value, u, span] = row.as_slice() else {
+        return None;
+    };
+    let (number, unit) = value.split_once(' ')?;
+    let name_alone = name.split(' ').next().unwrap_or(name);
+    let place = match name.split_once(" at ") {
+        Some((_, at)) => format!("at {at} {}", largest.unit_of_place()),
+        None => format!("at the end of {span}"),
+    };
+    Some((
+        format!("{name_alone} {number} ± {u} {unit}"),
+        format!("{place}, k = 2"),
+    ))
 }
 
 /// A sentence for the sign of each squareness among components; none without one.
@@ -318,12 +347,28 @@ impl Coefficient<'_> {
         arm * way.powi(i32::from(self.power()))
     }
 
+    /// Value at the end of the span, µm or µrad.
+    fn at_end(&self) -> f64 {
+        self.times_reach(&self.curve.coefficient)
+    }
+
+    fn times_reach(&self, values: &[f64]) -> f64 {
+        let factor = self.reach().powi(i32::from(self.power())) * scale(self.curve.component);
+        values.get(self.place).copied().unwrap_or(f64::NAN) * factor
+    }
+
+    fn unit_of_place(&self) -> &'static str {
+        if self.curve.component.of.is_linear() {
+            "mm"
+        } else {
+            "rad"
+        }
+    }
+
     fn row(&self) -> Vec<String> {
         let component = self.curve.component;
-        let factor = self.reach().powi(i32::from(self.power())) * scale(component);
-        let of = |values: &[f64]| values.get(self.place).copied().unwrap_or(f64::NAN) * factor;
-        let u = COVERAGE * of(&self.curve.standard_uncertainty);
-        let (value, u) = rounded(of(&self.curve.coefficient), u);
+        let u = COVERAGE * self.times_reach(&self.curve.standard_uncertainty);
+        let (value, u) = rounded(self.at_end(), u);
         vec![
             self.name(),
             format!("{value} {}", unit(component)),

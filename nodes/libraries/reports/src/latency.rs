@@ -7,6 +7,7 @@ use metrology::sample::{LatencyMethod, ProbeLatency, ProbedPoint, Rejection, Tes
 use super::page::{figure, fold, table};
 use super::plot::{Plot, Trace, svg};
 use super::screen::{Screen, Tile, Tone};
+use super::section::rounded;
 use super::svg::short;
 use super::{Report, conditions};
 use crate::evidence::Evidence;
@@ -130,7 +131,7 @@ pub fn section(evidence: &Evidence) -> Result<Markup> {
     let rows = rows(&evidence.latencies);
     Ok(html! {
         @if !rows.is_empty() || picture.is_some() {
-            (fold("Probe latency", None, false, &html! {
+            (fold("Probe latency", headline(evidence).first().map(String::as_str), false, &html! {
                 @if let Some(picture) = &picture { (picture) }
                 (table(&LATENCY_COLUMNS, &rows))
             }))
@@ -189,11 +190,18 @@ pub fn screen(evidence: &Evidence) -> Result<Screen> {
     };
     let expanded_s = COVERAGE * latency.standard_uncertainty_s;
     let value = format!("{} ± {} ms", ms(latency.latency_s), ms(expanded_s));
-    let more = format!(
+    let mut more = format!(
         "k = 2; {} touches at {} feeds",
         latency.n,
         latency.feeds_mm_s.len()
     );
+    if let Some(feed_mm_s) = latency.feeds_mm_s.iter().copied().reduce(f64::max) {
+        more.push_str(&format!(
+            "; at {:.0} mm/min it moves a touch by {} µm",
+            feed_mm_s * 60.0,
+            with_u_um(latency.latency_s, expanded_s, feed_mm_s)
+        ));
+    }
     let (sentence, tone) = match evidence.true_latency_s {
         Some(truth_s) => {
             let off = (latency.latency_s - truth_s).abs() / latency.standard_uncertainty_s;
@@ -205,10 +213,7 @@ pub fn screen(evidence: &Evidence) -> Result<Screen> {
             );
             (sentence, tone)
         }
-        None => (
-            format!("Probe latency {value} (k = 2); the true value of this machine is not known."),
-            Tone::Plain,
-        ),
+        None => (format!("Probe latency {value} (k = 2)."), Tone::Plain),
     };
     Ok(Screen {
         verdict: Some((sentence, tone)),
@@ -216,6 +221,13 @@ pub fn screen(evidence: &Evidence) -> Result<Screen> {
         picture: picture(evidence)?,
         ..Screen::default()
     })
+}
+
+/// The way at a feed during the latency with its U, µm.
+fn with_u_um(latency_s: f64, expanded_s: f64, feed_mm_s: f64) -> String {
+    let um = |seconds_s: f64| seconds_s * feed_mm_s * 1e3;
+    let (way, u) = rounded(um(latency_s), um(expanded_s));
+    format!("{way} ± {u}")
 }
 
 /// The page of a latency scenario.
@@ -271,6 +283,11 @@ mod tests {
             sequence: 1,
         };
         (1, point)
+    }
+
+    #[test]
+    fn u_of_the_latency_is_a_length_at_a_feed() {
+        assert_eq!(with_u_um(0.0037, 0.000_098, 2.0), "7.40 ± 0.20");
     }
 
     #[test]

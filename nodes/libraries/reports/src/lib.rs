@@ -14,6 +14,7 @@ use terminal::{Part, Room};
 use evidence::Evidence;
 
 pub mod angular;
+mod bars;
 mod blocks;
 pub mod circular;
 mod conditions;
@@ -35,6 +36,7 @@ pub mod periodic;
 pub mod plot;
 mod pointed;
 pub mod positioning;
+mod predictions;
 pub mod probing;
 pub mod published;
 mod rotary;
@@ -47,6 +49,7 @@ pub mod test_conditions;
 mod thermal;
 mod tool_error;
 mod trace;
+mod vectors;
 pub mod verification;
 pub mod whole_file;
 
@@ -178,8 +181,20 @@ impl Report {
         let head = format!("\n\n{}", gap.head());
         self.parts.push(Part::answers(head, gap.lines));
         self.parts.extend(gap.parts);
-        // The diagnosis is what the page is about: it comes before the tests that it rests on.
-        self.body = maud::html! { h2 { (gap.title) } (gap.body) (self.body) };
+        // A page with a verdict of its own is about that; otherwise the diagnosis comes before the tests that it rests on.
+        let has_verdict = self.screen.verdict.is_some();
+        let below = gap.screen.picture.as_ref();
+        let below = below.filter(|_| self.screen.picture.is_some());
+        let diagnosis = maud::html! {
+            h2 { (gap.title) }
+            @if let Some(picture) = below { (picture) }
+            (gap.body)
+        };
+        self.body = maud::html! {
+            @if !has_verdict { (diagnosis) }
+            (self.body)
+            @if has_verdict { (diagnosis) }
+        };
         self.screen.join(gap.screen);
         self.figures["gap"] = gap.figures;
     }

@@ -5,17 +5,20 @@ use std::collections::BTreeMap;
 use anyhow::Result;
 use maud::{Markup, html};
 use metrology::Axis;
+use metrology::sample::FacePosition;
 use metrology::stamp::{Host, Stamp};
 
 use super::page::{figure, fold};
 use super::plot::{Plot, Trace, svg};
 use super::screen::Tile;
-use super::svg::short;
+use super::section::rounded;
 use super::tool_error::ToolError;
 use crate::evidence::Evidence;
 
 /// Seconds of an hour.
 const HOUR_S: f64 = 3600.0;
+/// Coverage factor of what is printed.
+const COVERAGE: f64 = 2.0;
 /// Length below which times of a run are shown in minutes, h.
 const SHORT_H: f64 = 1.0;
 
@@ -93,11 +96,75 @@ fn most(evidence: &Evidence) -> Option<(Axis, Trace, f64)> {
     all.max_by(|a, b| a.2.total_cmp(&b.2))
 }
 
+/// The reading that is farthest from the cold one of its face.
+struct Farthest {
+    axis: Axis,
+    block: String,
+    drift_um: f64,
+    /// Of the difference of two readings, without the latency that both share, k = 2, µm.
+    expanded_uncertainty_um: f64,
+    at: Stamp<Host>,
+}
+
+fn farthest(evidence: &Evidence) -> Option<Farthest> {
+    let mut cold = BTreeMap::new();
+    let mut found: Option<Farthest> = None;
+    for block in &evidence.blocks {
+        for axis in Axis::LINEAR {
+            let Some(face) = block.faces[axis] else {
+                continue;
+            };
+            let key = (block.block_id.as_str(), axis);
+            if block.cold {
+                cold.insert(key, face);
+            }
+            let Some(first) = cold.get(&key) else {
+                continue;
+            };
+            let drift_um = (face.position_mm - first.position_mm) * 1e3;
+            let u_mm = [first, &face].map(FacePosition::independent_uncertainty_mm);
+            if found
+                .as_ref()
+                .is_none_or(|most| drift_um.abs() > most.drift_um.abs())
+            {
+                found = Some(Farthest {
+                    axis,
+                    block: block.block_id.clone(),
+                    drift_um,
+                    expanded_uncertainty_um: COVERAGE * u_mm[0].hypot(u_mm[1]) * 1e3,
+                    at: face.at,
+                });
+            }
+        }
+    }
+    found.filter(|most| most.drift_um.abs() > 0.0)
+}
+
+impl Farthest {
+    fn value(&self) -> String {
+        let (value, u) = rounded(self.drift_um, self.expanded_uncertainty_um);
+        format!("{value} ± {u} µm in {}", self.axis)
+    }
+
+    fn when(&self, evidence: &Evidence) -> String {
+        let (unit, unit_s) = unit(evidence);
+        let at = (self.at - start(evidence)).as_secs_f64() / unit_s;
+        format!("{}, {at:.1} {unit} after the start", self.block)
+    }
+}
+
 /// The greatest drift of a face, as a tile.
 pub fn greatest_drift(evidence: &Evidence) -> Option<Tile> {
-    let (axis, trace, size_um) = most(evidence)?;
-    let value = format!("{} µm in {axis}", short(size_um));
-    Some(Tile::new("greatest drift at a block", value, trace.name))
+    let most = farthest(evidence)?;
+    let more = format!("{}; k = 2", most.when(evidence));
+    Some(Tile::new("greatest drift at a block", most.value(), more))
+}
+
+/// The same as a sentence.
+pub fn most_in_words(evidence: &Evidence) -> Option<String> {
+    let most = farthest(evidence)?;
+    let when = most.when(evidence);
+    Some(format!("Greatest: {}, {when} (k = 2).", most.value()))
 }
 
 /// The greatest drift with the tool error without and with compensation beside it.
@@ -173,12 +240,61 @@ pub fn section(evidence: &Evidence) -> Result<Markup> {
         y: "offset of the axis / µm".to_owned(),
         traces,
     };
-    let caption = "What compensation added to each axis.";
+    let caption = "Offset that compensation added to each axis.";
     let drawn = figure(&svg(&plot)?, caption);
+    let all = traces_of(&plot);
+    let greatest = all.max_by(|a, b| a.1.total_cmp(&b.1));
+    let answer = greatest.map(|(name, um)| format!("At most {um:.1} µm, in {name}."));
     Ok(fold(
         "Offsets that compensation applied",
-        None,
+        answer.as_deref(),
         false,
         &drawn,
     ))
+}
+
+/// Name and greatest size of each line, µm.
+fn traces_of(plot: &Plot) -> impl Iterator<Item = (&str, f64)> {
+    plot.traces.iter().map(|trace| {
+        let sizes = trace.points.iter().map(|point| point.1.abs());
+        (trace.name.as_str(), sizes.fold(0.0, f64::max))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use metrology::PerAxis;
+    use metrology::sample::{BlockMeasurement, LatencyShare};
+
+    use super::*;
+
+    fn block(z_mm: f64, cold: bool) -> BlockMeasurement {
+        let mut faces = PerAxis::default();
+        faces[Axis::Z] = Some(FacePosition {
+            position_mm: z_mm,
+            standard_uncertainty_mm: 0.0005,
+            at: Stamp::from_nanos(90_000_000_000),
+            latency: LatencyShare::default(),
+        });
+        BlockMeasurement {
+            at: Stamp::from_nanos(90_000_000_000),
+            block_id: "block_1".to_owned(),
+            faces,
+            cold,
+            run: 1,
+        }
+    }
+
+    #[test]
+    fn the_greatest_drift_has_the_uncertainty_of_a_difference() {
+        let evidence = Evidence {
+            blocks: vec![block(20.0, true), block(20.0007, false)],
+            ..Evidence::default()
+        };
+        // 2 sqrt(0.5^2 + 0.5^2) = 1.41.
+        let tile = greatest_drift(&evidence).unwrap();
+        assert_eq!(tile.value, "0.7 ± 1.4 µm in Z");
+        assert_eq!(tile.more, "block_1, 1.5 min after the start; k = 2");
+        assert!(greatest_drift(&Evidence::default()).is_none());
+    }
 }

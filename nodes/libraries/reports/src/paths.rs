@@ -54,7 +54,7 @@ pub fn section(paths: &[PathRecording]) -> Result<Option<Section>> {
         .max_by(|a, b| span_mm(a).total_cmp(&span_mm(b)))
     {
         section.answer(format!(
-            "widest {} of run {}: {} µm between the greatest deviations to either side of the path.",
+            "Widest {} of run {}: {} µm between the greatest deviations to either side of the path.",
             name(worst.segment.kind),
             worst.segment.run,
             um(span_mm(worst))
@@ -67,6 +67,7 @@ pub fn section(paths: &[PathRecording]) -> Result<Option<Section>> {
             format!("Left out: {left_out} readings beyond the most that a path keeps."),
         );
     }
+    section.lines.push(evaluated(paths));
     section.tables.push(table(paths));
     for (kind, name) in NAMES {
         let own: Vec<&PathRecording> = paths
@@ -80,6 +81,28 @@ pub fn section(paths: &[PathRecording]) -> Result<Option<Section>> {
     section.figures =
         json!({ "test": section.title, "paths": paths.iter().map(figures).collect::<Vec<_>>() });
     Ok(Some(section))
+}
+
+/// Which readings are evaluated.
+fn evaluated(paths: &[PathRecording]) -> String {
+    let n: usize = paths.iter().filter_map(|path| path.run_in).sum();
+    let whole: Vec<String> = { paths.iter() }
+        .filter(|path| path.run_in.is_none())
+        .map(|path| path.segment.run.to_string())
+        .collect();
+    let marked = format!(
+        "Evaluated is the part that the control recorded at its full rate, as (rate: full) of the program asks; {n} readings of run-in and run-out are left out."
+    );
+    match whole.len() {
+        0 => marked,
+        all if all == paths.len() => {
+            "No recording marks its evaluated part by (rate: full): run-in and run-out are part of the figures.".to_owned()
+        }
+        _ => format!(
+            "{marked} Runs {} mark no evaluated part: run-in and run-out are part of their figures.",
+            whole.join(", ")
+        ),
+    }
 }
 
 fn table(paths: &[PathRecording]) -> Rows {
@@ -108,6 +131,7 @@ fn figures(path: &PathRecording) -> serde_json::Value {
         "kind": name(path.segment.kind),
         "feed_mm_min": path.segment.feed_mm_s * 60.0,
         "readings": path.points.len(),
+        "run_in_readings_left_out": path.run_in,
         "greatest_deviation_mm": most,
         "least_deviation_mm": least,
         "rms_mm": rms,
@@ -158,6 +182,7 @@ mod tests {
                 })
                 .to_vec(),
             left_out: 0,
+            run_in: (run == 3).then_some(120),
         };
         let paths = [
             path(TestKind::Line, 3, 0.001),
@@ -171,6 +196,11 @@ mod tests {
             section.answers
         );
         assert_eq!(section.figures["paths"][0]["kind"], "line");
+        let line = section.lines.last().unwrap();
+        assert!(
+            line.contains("120 readings of run-in") && line.contains("Runs 5 mark"),
+            "{line}"
+        );
         assert!(super::section(&[]).unwrap().is_none());
     }
 }

@@ -50,6 +50,10 @@ const FRAME: [f64; 4] = [84.0, 704.0, 14.0, 262.0];
 pub const COLOURS: usize = 6;
 /// Most points of a trace that show their values.
 const MOST_HOVERED: usize = 120;
+/// Most points of a line that are drawn as dots on it, so that what was read differs from what lies between.
+const MOST_DOTTED: usize = 24;
+/// More marks of a trace are drawn small and translucent, so that those below them are seen.
+const MOST_LARGE: usize = 60;
 /// Margin above and below the lines, as a share of their range.
 const MARGIN: f64 = 0.06;
 /// A range that begins so close to zero begins at zero, as a share of its end.
@@ -128,12 +132,21 @@ pub fn svg(plot: &Plot) -> Result<String> {
 /// # Errors
 /// As [`svg`].
 pub fn banded_svg(plot: &Plot, bands: &[Band]) -> Result<String> {
-    drawn(plot, bands).map_err(|error| anyhow!("plot \"{}\": {error}", plot.y))
+    paired_svg(plot, bands, &[])
 }
 
-fn drawn(plot: &Plot, bands: &[Band]) -> Result<String, std::fmt::Error> {
+/// The same with traces that share colours; `colours`: the number of each trace's colour, its place where there is none.
+///
+/// # Errors
+/// As [`svg`].
+pub fn paired_svg(plot: &Plot, bands: &[Band], colours: &[usize]) -> Result<String> {
+    drawn(plot, bands, colours).map_err(|error| anyhow!("plot \"{}\": {error}", plot.y))
+}
+
+fn drawn(plot: &Plot, bands: &[Band], colours: &[usize]) -> Result<String, std::fmt::Error> {
     let scales = (across(plot), upwards(plot, bands));
-    let mut text = head(plot, bands);
+    let colour = |place: usize| colours.get(place).copied().unwrap_or(place);
+    let mut text = head(plot, bands, &colour);
     write!(
         text,
         "<svg class=\"plot\" role=\"img\" aria-label=\"{} over {}\" viewBox=\"0 0 {WIDTH} {HEIGHT}\">",
@@ -142,32 +155,41 @@ fn drawn(plot: &Plot, bands: &[Band]) -> Result<String, std::fmt::Error> {
     )?;
     axes(&mut text, plot, &scales)?;
     for band in bands {
-        draw_band(&mut text, band, &scales)?;
+        draw_band(&mut text, band, colour(band.of), &scales)?;
     }
     for (place, trace) in plot.traces.iter().enumerate() {
-        draw_trace(&mut text, plot, place, trace, &scales)?;
+        draw_trace(&mut text, plot, (trace, colour(place)), &scales)?;
     }
     text.push_str("</svg>");
     Ok(text)
 }
 
 /// What stands above the drawing: the title of the vertical axis, and what each colour is.
-fn head(plot: &Plot, bands: &[Band]) -> String {
+fn head(plot: &Plot, bands: &[Band], colour: &impl Fn(usize) -> usize) -> String {
     let lines = plot.traces.iter().enumerate();
     let lines: Vec<(usize, &str, &str)> = lines
         .map(|(place, trace)| {
-            let kind = if trace.marks { "dot" } else { "line" };
-            (place, kind, trace.name.as_str())
+            let kind = match () {
+                () if trace.marks => "dot",
+                () if is_dashed(colour(place)) => "line dashed",
+                () => "line",
+            };
+            (colour(place), kind, trace.name.as_str())
         })
         .collect();
     let bands = bands
         .iter()
-        .map(|band| (band.of, "band", band.name.as_str()));
+        .map(|band| (colour(band.of), "band", band.name.as_str()));
     let named: Vec<(usize, &str, &str)> = lines.into_iter().chain(bands).collect();
     legend(&plot.y, &named)
 }
 
-/// A title, and colour, kind (`line`, `dot` or `band`) and name of everything that is drawn.
+/// Whether a line is dashed, since a line before it has its colour.
+const fn is_dashed(colour: usize) -> bool {
+    colour / COLOURS % 2 == 1
+}
+
+/// A title, and colour, kind (`line`, `line dashed`, `dot` or `band`) and name of everything that is drawn.
 #[must_use]
 pub fn legend(title: &str, named: &[(usize, &str, &str)]) -> String {
     maud::html! {
@@ -211,7 +233,12 @@ fn axes(text: &mut String, plot: &Plot, (x, y): &(Scale, Scale)) -> std::fmt::Re
     )
 }
 
-fn draw_band(text: &mut String, band: &Band, (x, y): &(Scale, Scale)) -> std::fmt::Result {
+fn draw_band(
+    text: &mut String,
+    band: &Band,
+    colour: usize,
+    (x, y): &(Scale, Scale),
+) -> std::fmt::Result {
     let is_finite = |p: &&(f64, f64, f64)| p.0.is_finite() && p.1.is_finite() && p.2.is_finite();
     let points = || band.points.iter().filter(is_finite);
     if points().next().is_none() {
@@ -220,7 +247,7 @@ fn draw_band(text: &mut String, band: &Band, (x, y): &(Scale, Scale)) -> std::fm
     write!(
         text,
         "<g class=\"c{}\"><polygon fill=\"currentColor\" fill-opacity=\"0.18\" points=\"",
-        band.of % COLOURS
+        colour % COLOURS
     )?;
     for (at, low, _) in points() {
         write!(text, "{:.1},{:.1} ", x.px(*at), y.px(*low))?;
@@ -235,51 +262,72 @@ fn draw_band(text: &mut String, band: &Band, (x, y): &(Scale, Scale)) -> std::fm
 fn draw_trace(
     text: &mut String,
     plot: &Plot,
-    place: usize,
-    trace: &Trace,
+    (trace, colour): (&Trace, usize),
     (x, y): &(Scale, Scale),
 ) -> std::fmt::Result {
     let stretches = stretches(&trace.points);
-    write!(text, "<g class=\"c{}\">", place % COLOURS)?;
+    write!(text, "<g class=\"c{}\">", colour % COLOURS)?;
     if !trace.marks {
+        let dashes = if is_dashed(colour) {
+            " stroke-dasharray=\"7 4\""
+        } else {
+            ""
+        };
         for stretch in &stretches {
-            text.push_str(
-                "<polyline fill=\"none\" stroke=\"currentColor\" stroke-width=\"2\" points=\"",
-            );
+            write!(
+                text,
+                "<polyline fill=\"none\" stroke=\"currentColor\" stroke-width=\"2\"{dashes} points=\""
+            )?;
             for (at, value) in stretch {
                 write!(text, "{:.1},{:.1} ", x.px(*at), y.px(*value))?;
             }
             text.push_str("\"/>");
         }
     }
-    let all = stretches.iter().flatten();
-    let n: usize = stretches.iter().map(Vec::len).sum();
-    // A single value makes no line.
-    let is_seen = trace.marks || n == 1;
-    if is_seen || n <= MOST_HOVERED {
-        let (radius, fill) = if is_seen { (3.5, 1) } else { (8.0, 0) };
-        for (at, value) in all {
+    let points = stretches.concat();
+    draw_marks(text, plot, trace, &points, (x, y))?;
+    text.push_str("</g>");
+    Ok(())
+}
+
+/// The marks of a trace, or the dots of a line with few points; with values under the pointer where there are not too many.
+fn draw_marks(
+    text: &mut String,
+    plot: &Plot,
+    trace: &Trace,
+    points: &[(f64, f64)],
+    (x, y): (&Scale, &Scale),
+) -> std::fmt::Result {
+    let n = points.len();
+    // Around a dot, the pointer finds its value within some px.
+    let reach = "stroke=\"currentColor\" stroke-opacity=\"0\" stroke-width=\"9\"";
+    let (radius, opacity) = match () {
+        () if trace.marks && n > MOST_LARGE => (2.2, 0.6),
+        () if trace.marks || n <= MOST_DOTTED => (3.5, 1.0),
+        () if n <= MOST_HOVERED => (3.5, 0.0),
+        () => return Ok(()),
+    };
+    for (at, value) in points {
+        write!(
+            text,
+            "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{radius}\" fill=\"currentColor\" fill-opacity=\"{opacity}\"",
+            x.px(*at),
+            y.px(*value)
+        )?;
+        if n <= MOST_HOVERED {
             write!(
                 text,
-                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{radius}\" fill=\"currentColor\" fill-opacity=\"{fill}\">",
-                x.px(*at),
-                y.px(*value)
+                " {reach}><title>{}: {} {}, {} {}</title></circle>",
+                escaped(&trace.name),
+                escaped(&plot.x),
+                short(*at),
+                escaped(&plot.y),
+                short(*value)
             )?;
-            if n <= MOST_HOVERED {
-                write!(
-                    text,
-                    "<title>{}: {} {}, {} {}</title>",
-                    escaped(&trace.name),
-                    escaped(&plot.x),
-                    short(*at),
-                    escaped(&plot.y),
-                    short(*value)
-                )?;
-            }
-            text.push_str("</circle>");
+        } else {
+            text.push_str("/>");
         }
     }
-    text.push_str("</g>");
     Ok(())
 }
 
@@ -342,6 +390,25 @@ mod tests {
             let y: f64 = pair.split(',').nth(1).unwrap().parse().unwrap();
             assert!((FRAME[2]..=FRAME[3]).contains(&y), "{pair}");
         }
+    }
+
+    #[test]
+    fn no_two_of_twelve_lines_look_alike() {
+        let mut many = plot((0..40).map(|k| (f64::from(k), 1.0)).collect());
+        many.traces = vec![many.traces[0].clone(); 12];
+        let text = svg(&many).unwrap();
+        assert_eq!(text.matches("stroke-dasharray").count(), 6, "{text}");
+        assert_eq!(text.matches("class=\"line dashed c0\"").count(), 1);
+    }
+
+    #[test]
+    fn a_line_of_few_readings_shows_them_and_pairs_share_a_colour() {
+        let few = plot(vec![(0.0, 1.0), (1.0, 2.0)]);
+        let text = paired_svg(&few, &[], &[0, 0]).unwrap();
+        assert_eq!(text.matches("fill-opacity=\"1\"").count(), 4, "{text}");
+        assert_eq!(text.matches("<g class=\"c0\">").count(), 2);
+        let many = plot((0..90).map(|k| (f64::from(k), 1.0)).collect());
+        assert!(!svg(&many).unwrap().contains("fill-opacity=\"1\""));
     }
 
     #[test]

@@ -11,13 +11,12 @@ use super::svg::unsigned_zero;
 use crate::evidence::Evidence;
 
 /// Head of the table.
-pub const TOUCH_COLUMNS: [&str; 6] = [
+pub const TOUCH_COLUMNS: [&str; 5] = [
     "touch",
     "probe axis",
     "A, C / deg",
     "other solution / deg",
-    "A, C at contact / deg",
-    "off / arcsec",
+    "at contact off by A, C / arcsec",
 ];
 /// Arc seconds in a degree.
 const ARCSEC: f64 = 3600.0;
@@ -29,7 +28,7 @@ pub fn section(evidence: &Evidence) -> Markup {
         @if !rows.is_empty() {
             (fold("Touches along given directions", None, false, &html! {
             (table(&TOUCH_COLUMNS, &rows))
-            p.note { "The probe axis points from the ball to the spindle, in the workpiece frame. A and C follow from it; of the two solutions the nearest inside the travel is taken. At contact: positions as probe/point has them, of the rotary encoders." }
+            p.note { "The probe axis points from the ball to the spindle, in the workpiece frame. A and C follow from it; of the two solutions the nearest inside the travel is taken. At contact: by how much the rotary encoders were off these angles, from the positions of probe/point, which report.json has." }
             }))
         }
     }
@@ -48,7 +47,6 @@ pub fn rows(evidence: &Evidence) -> Vec<Vec<String>> {
                 axis.join(", "),
                 pair([a_deg, c_deg]),
                 other(pointing),
-                pair(at),
                 [at[0] - a_deg, at[1] - c_deg]
                     .map(|off_deg| signed(off_deg * ARCSEC))
                     .join(", "),

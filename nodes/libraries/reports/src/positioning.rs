@@ -241,6 +241,9 @@ fn fill_one_sided(
         ],
         note: measured.uncertainty_note().to_owned(),
     });
+    section
+        .lines
+        .extend(uncertainty::largest(&result.contributions, measured));
     let terms = uncertainty::table(&result.contributions, measured);
     section.tables.extend(terms);
     let mut figures = serde_json::json!({
@@ -322,6 +325,9 @@ fn fill(
         measured.coverage()
     ));
     section.tables.push(figures(result, measured));
+    section
+        .lines
+        .extend(uncertainty::largest(&result.contributions, measured));
     let terms = uncertainty::table(&result.contributions, measured);
     section.tables.extend(terms);
     section.figures = serde_json::json!({

@@ -9,8 +9,8 @@ use metrology::sample::{CurveForm, ErrorCurve, GeometryModel};
 
 use super::page::{figure, fold, table};
 use super::plot::{self, Plot, Trace};
-use super::screen::{Screen, compensated};
-use super::section::{Rows, head};
+use super::screen::{Screen, Tile, Tone, compensated};
+use super::section::{Rows, head, rounded};
 use super::svg::unsigned_zero;
 use super::terminal::Part;
 use super::tool_error::quantile;
@@ -45,9 +45,16 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
         (table(&TOOL_HEAD, &tools))
         p.note { "Truth of the plant at poses that the machine really went to, all five axes' errors included; no node sees it." }
     };
+    let answer = pair(evidence).map(|(off, on)| {
+        format!(
+            "At most {:.2} µm without compensation, {:.2} µm with it.",
+            off.max_mm * 1e3,
+            on.max_mm * 1e3
+        )
+    });
     let body = html! {
         @for line in &lines { p { (line) } }
-        @if !tools.is_empty() { (fold("Tool error at the verification poses", None, false, &tools_part)) }
+        @if !tools.is_empty() { (fold("Tool error at the verification poses", answer.as_deref(), false, &tools_part)) }
         @if !locations.is_empty() { (fold("Location errors", None, true, &locations_part)) }
         (pointed::section(evidence))
         (latency::section(evidence)?)
@@ -113,17 +120,75 @@ fn screen(evidence: &Evidence) -> Result<Screen> {
             "Size of the true error of the tool at each pose, in the order of the program.";
         screen.picture = Some(figure(&plot::svg(&plot)?, caption));
     }
-    let is_beyond = |condition: &&Condition| condition.diagnostic.name == BEYOND_EXPECTED;
-    let beyond = evidence.conditions.iter().filter(is_beyond);
-    screen
-        .lacks
-        .extend(beyond.map(|one| format!("Beyond expected: {}.", one.diagnostic.message)));
+    screen.tiles.extend(largest_location(evidence));
+    state_beyond(&mut screen, evidence);
     let behind = vec![conditions::section(evidence)];
     screen.join(Screen {
         behind,
         ..latency::screen(evidence)?
     });
     Ok(screen)
+}
+
+/// States what is left beyond the expected, with the next step.
+fn state_beyond(screen: &mut Screen, evidence: &Evidence) {
+    let is_beyond = |condition: &&Condition| condition.diagnostic.name == BEYOND_EXPECTED;
+    let beyond: Vec<&Condition> = evidence.conditions.iter().filter(is_beyond).collect();
+    if let (Some(last), Some((sentence, tone))) = (beyond.last(), &mut screen.verdict) {
+        let message = last
+            .diagnostic
+            .message
+            .split(';')
+            .next()
+            .unwrap_or_default();
+        sentence.push_str(&format!(" More is left than expected: {message}."));
+        *tone = Tone::Bad;
+        screen.next = Some(Tile::new(
+            "next step",
+            "calibrate again",
+            "warm the machine up, check the seat of the probe, then repeat the calibration",
+        ));
+    }
+    let lines = beyond
+        .iter()
+        .map(|one| format!("Beyond expected: {}.", one.diagnostic.message));
+    screen.lacks.extend(lines);
+}
+
+/// The largest location error, and the largest tilt, with U.
+fn largest_location(evidence: &Evidence) -> Option<Tile> {
+    let model = evidence.rotary_models.last()?;
+    let largest = |is_angular: bool| {
+        let is_wanted = |curve: &&ErrorCurve| {
+            curve.component.is_angular() == is_angular && curve.estimable.first() == Some(&true)
+        };
+        let size = |curve: &&ErrorCurve| curve.coefficient.first().map_or(0.0, |c| c.abs());
+        let own = locations(model).filter(is_wanted);
+        own.max_by(|a, b| size(a).total_cmp(&size(b)))
+    };
+    let in_words = |curve: &ErrorCurve| {
+        let (scale, unit) = scale_and_unit(curve);
+        let value = curve.coefficient.first()? * scale;
+        let u = curve.standard_uncertainty.first()? * COVERAGE * scale;
+        let (value, u) = rounded(value, u);
+        Some(format!("{} {value} ± {u} {unit}", curve.component))
+    };
+    let tilt = largest(true).and_then(in_words);
+    let tilt = tilt.map_or_else(String::new, |tilt| format!("largest tilt {tilt}; "));
+    let value = in_words(largest(false)?)?;
+    Some(Tile::new(
+        "largest location error",
+        value,
+        format!("{tilt}k = 2"),
+    ))
+}
+
+fn scale_and_unit(curve: &ErrorCurve) -> (f64, &'static str) {
+    if curve.component.is_angular() {
+        (1e6, "µrad")
+    } else {
+        (1e3, "µm")
+    }
 }
 
 /// A table, and how it stands in the whole text.
@@ -149,11 +214,7 @@ fn locations(model: &GeometryModel) -> impl Iterator<Item = &ErrorCurve> {
 fn location_rows(model: &GeometryModel) -> Vec<Vec<String>> {
     locations(model)
         .map(|curve| {
-            let (scale, unit) = if curve.component.is_angular() {
-                (1e6, "µrad")
-            } else {
-                (1e3, "µm")
-            };
+            let (scale, unit) = scale_and_unit(curve);
             let seen = curve.estimable.first().copied().unwrap_or(false);
             let u = curve
                 .standard_uncertainty

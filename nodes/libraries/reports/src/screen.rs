@@ -10,6 +10,7 @@ use replayer::machines;
 use serde_json::{Value, json};
 
 use crate::machine_of_bag;
+use crate::section::capitalised;
 
 /// Most tiles.
 const MOST_TILES: usize = 5;
@@ -264,7 +265,7 @@ impl Screen {
             1 => "1 remark".to_owned(),
             n => format!("{n} remarks"),
         };
-        Some(Tile::new("failed or missing", value, first.clone()).toned(Tone::Bad))
+        Some(Tile::new("failed or missing", value, capitalised(first)).toned(Tone::Bad))
     }
 
     /// The head of a page.
@@ -281,7 +282,7 @@ impl Screen {
             @if let Some(picture) = &self.picture { (picture) }
             @if self.lacks.len() > 1 {
                 (super::page::fold("Failed or missing", None, false, &html! {
-                    ul { @for line in &self.lacks { li { (line) } } }
+                    ul { @for line in &self.lacks { li { (capitalised(line)) } } }
                 }))
             }
         }
@@ -380,7 +381,7 @@ mod tests {
         assert_eq!(shown[3].value, "2 remarks");
         assert_eq!(shown[4].name, "next step");
         let html = screen.html("t").into_string();
-        assert!(html.contains("no budget."), "{html}");
+        assert!(html.contains("No budget."), "{html}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Wi
 use maud::{Markup, html};
 
 use super::page;
+use super::screen::Tile;
 use super::svg::unsigned_zero;
 use super::terminal::Rank;
 
@@ -56,6 +57,8 @@ pub struct Section {
     pub answers: Vec<String>,
     /// What it could not find, for the short text; each is one of [`Self::lines`] as well.
     pub warnings: Vec<Warning>,
+    /// What the first screen has of it, where that is not its first answer.
+    pub tile: Option<Tile>,
 }
 
 /// A sentence on what was not evaluated or not used.
@@ -143,15 +146,20 @@ impl Section {
             }
         };
         let has_tables = self.tables.iter().any(|table| !table.rows.is_empty());
+        let answer = self.answers.first().map(String::as_str);
+        let answer = answer.or_else(|| self.warnings.first().map(|warning| warning.line.as_str()));
+        // The first answer stands beside the title.
+        let is_below = |line: &&String| Some(line.as_str()) != answer;
         let content = html! {
-            @for answer in self.answers.iter().filter(|line| !self.lines.contains(line)) { p { (answer) } }
-            @for line in &self.lines { p { (line) } }
+            @for answer in self.answers.iter().filter(|line| !self.lines.contains(line)).filter(is_below) { p { (capitalised(answer)) } }
+            @for line in self.lines.iter().filter(is_below) { p { (capitalised(line)) } }
             @for drawing in &self.drawings { (page::figure(&drawing.svg, &drawing.caption)) }
             @if has_tables && !self.drawings.is_empty() { (page::all_figures(&tables)) } @else { (tables) }
         };
-        let answer = self.answers.first().map(String::as_str);
-        let answer = answer.or_else(|| self.warnings.first().map(|warning| warning.line.as_str()));
-        page::fold(&self.title, answer, self.rank == Rank::Answer, &content)
+        let answer = answer.map(capitalised);
+        // A drawing of an answer stands on the first screen already.
+        let is_open = self.rank == Rank::Answer && self.drawings.is_empty();
+        page::fold(&self.title, answer.as_deref(), is_open, &content)
     }
 }
 
@@ -203,6 +211,22 @@ pub fn um(length_mm: f64) -> String {
     unsigned_zero(format!("{:.2}", length_mm * 1e3))
 }
 
+/// A sentence with a capital letter, unless it begins with a name such as `grid_encoder` or `nut_x`.
+#[must_use]
+pub fn capitalised(line: &str) -> String {
+    let first = line.split(' ').next().unwrap_or_default();
+    let is_word = first
+        .chars()
+        .all(|c| c.is_alphabetic() || ",:;-".contains(c));
+    let mut letters = line.chars();
+    match letters.next() {
+        Some(letter) if is_word && letter.is_ascii_lowercase() => {
+            letter.to_uppercase().chain(letters).collect()
+        }
+        _ => line.to_owned(),
+    }
+}
+
 /// Table head from names.
 #[must_use]
 pub fn head(names: &[&str]) -> Vec<String> {
@@ -233,6 +257,21 @@ mod tests {
         );
         let html = page::table(&["row", "span", "look at"], &rows.rows).into_string();
         assert!(html.contains("<td class=\"prose\">X+ and Y+"), "{html}");
+    }
+
+    #[test]
+    fn the_answer_stands_beside_the_title_alone_and_begins_with_a_capital() {
+        let mut section = Section::new("Circle XY");
+        section.answer("circular error G 10.84 µm.".to_owned());
+        section.lines.push("grid_encoder saw it.".to_owned());
+        let html = section.html().into_string();
+        assert_eq!(html.matches("ircular error G").count(), 1, "{html}");
+        assert!(
+            html.contains("<span class=\"answer\">Circular error"),
+            "{html}"
+        );
+        assert!(html.contains("<p>grid_encoder saw it.</p>"), "{html}");
+        assert_eq!(capitalised("12 runs."), "12 runs.");
     }
 
     #[test]

@@ -13,7 +13,8 @@ use super::section::{Rows, head};
 use super::svg::unsigned_zero;
 use super::terminal::Part;
 use super::tool_error::{self, BlocksSpan, Places, ToolError};
-use super::{Report, blocks, conditions, latency, over_time};
+use super::vectors::{self, Field};
+use super::{Report, blocks, conditions, latency, over_time, predictions};
 use crate::evidence::{Evidence, Verification};
 
 /// Label prefix of the cold verification in a plan.
@@ -37,7 +38,7 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
         (over_time::section(evidence)?)
         (errors_section(&errors, span.as_ref()))
         (drift_section(evidence)?)
-        (predictions(evidence))
+        (predictions::section(evidence)?)
         (latency::section(evidence)?)
     };
     Ok(Report {
@@ -80,19 +81,52 @@ fn screen(evidence: &Evidence, errors: &[ToolError]) -> Result<Screen> {
 /// The tables of the tool error, where there is one.
 fn errors_section(errors: &[ToolError], span: Option<&BlocksSpan>) -> Markup {
     let content = html! {
+        @if let Some(picture) = change_picture(errors) { (picture) }
         (error_table(errors))
-        p.note { "All in µm. Truth of the plant at poses that the machine really went to; no node sees it." @for line in EXPLAINED { " " (line) } }
+        p.note { "All in µm. Truth of the plant at poses that the machine really went to; no node sees it." }
+        ul.note { @for line in EXPLAINED { li { (line) } } }
         @if let Some(places) = places(errors) {
-            h3 { "At Z " (places.z_mm) " mm" }
+            h3 { "Corners and centre at Z " (places.z_mm) " mm" }
             (places_table(errors, &places))
             p.note { (of_places(&places, span)) }
         }
     };
     html! {
         @if !errors.is_empty() {
-            (fold("Change of the tool error since cold, in the blocks' span", None, false, &content))
+            (fold("Change of the tool error since cold, in the blocks' span", answer(errors).as_deref(), false, &content))
         }
     }
+}
+
+/// The last verification with compensation, and the largest part of what it left.
+fn answer(errors: &[ToolError]) -> Option<String> {
+    let (_, on) = last_pair(errors)?;
+    let parts = [
+        ("a shift of all poses", on.parts.shift_mm),
+        ("stretch along the axes", on.parts.stretch_mm),
+        ("rotation", on.parts.rotation_mm),
+        ("curved errors", on.parts.curved_mm),
+    ];
+    let (name, size_mm) = parts.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(format!(
+        "With compensation p95 {} µm, {} µm at most; the largest part is {name}, {} µm.",
+        um(on.change_p95_mm),
+        um(on.change_max_mm),
+        um(size_mm)
+    ))
+}
+
+/// The change since cold over the volume, at the last verification without and with compensation.
+fn change_picture(errors: &[ToolError]) -> Option<Markup> {
+    let (off, on) = last_pair(errors)?;
+    let field = |error: &ToolError| Field {
+        name: error.label.clone(),
+        arrows: { error.change.iter() }
+            .map(|pose| (pose.commanded_mm, pose.error_mm))
+            .collect(),
+    };
+    let of = "Change of the tool error since cold, inside and outside of the blocks' span";
+    vectors::picture(&[field(off), field(on)], of)
 }
 
 /// Drift of each face of the blocks, where any was measured twice.
@@ -109,7 +143,7 @@ fn drift_section(evidence: &Evidence) -> Result<Markup> {
     }
     Ok(html! {
         @if !figures.is_empty() {
-            (fold("Drift at the blocks", None, false, &html! { @for figure in &figures { (figure) } }))
+            (fold("Drift at the blocks", over_time::most_in_words(evidence).as_deref(), false, &html! { @for figure in &figures { (figure) } }))
         }
     })
 }
@@ -272,38 +306,6 @@ fn places_table(errors: &[ToolError], places: &Places) -> Markup {
     head.extend(errors.iter().map(|error| error.label.as_str()));
     table(&head, &place_rows(errors, places))
 }
-
-/// What was left at each update, had the drift been held since the last one or predicted.
-fn predictions(evidence: &Evidence) -> Markup {
-    let rows: Vec<Vec<String>> = evidence
-        .predictions
-        .iter()
-        .map(|prediction| {
-            let hours = (prediction.at - over_time::start(evidence)).as_secs_f64() / 3600.0;
-            let mut row = vec![format!("{hours:.2}")];
-            row.extend(PREDICTORS.map(|key| {
-                let value = prediction
-                    .residuals_um
-                    .iter()
-                    .find(|(name, _)| *name == key);
-                value
-                    .and_then(|(_, text)| text.parse::<f64>().ok())
-                    .map_or_else(|| "—".to_owned(), |um| format!("{um:.2}"))
-            }));
-            row
-        })
-        .collect();
-    html! {
-        @if !rows.is_empty() {
-            (fold("Prediction between block cycles", None, false, &html! {
-            (table(&["time / h", "held", "time constant", "temperatures"], &rows))
-            p.note { "Residual at the blocks at each update, root mean square in µm, had the last model been held, extrapolated with its time constant, or moved with the temperatures; a dash: that way was not identifiable or not proven yet." }
-            }))
-        }
-    }
-}
-
-const PREDICTORS: [&str; 3] = ["hold_um", "relaxation_um", "temperature_um"];
 
 /// The tables: laid out by hand in the whole text, and once more for the short one.
 fn parts(errors: &[ToolError], span: Option<&BlocksSpan>) -> Vec<Part> {

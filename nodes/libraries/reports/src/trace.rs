@@ -88,7 +88,7 @@ fn draw(
         text,
         "<svg class=\"plot polar\" role=\"img\" aria-label=\"circular traces\" viewBox=\"0 0 {SIZE} {SIZE}\">"
     )?;
-    rings(text, division_um)?;
+    rings(text)?;
     if let Some([u, v]) = plane_axes(plane) {
         let (right, up) = (SIZE - 6.0, 20.0);
         let middle = SIZE / 2.0;
@@ -128,6 +128,7 @@ fn draw(
         }
         text.push_str("</g>");
     }
+    ring_labels(text, division_um)?;
     text.push_str("</svg>");
     Ok(())
 }
@@ -145,7 +146,7 @@ fn stretches_of_turn(points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
     stretches(&by_number).into_iter().map(of).collect()
 }
 
-fn rings(text: &mut String, division_um: f64) -> std::fmt::Result {
+fn rings(text: &mut String) -> std::fmt::Result {
     let middle = SIZE / 2.0;
     for step in -RINGS..=RINGS {
         let divisions = NOMINAL + f64::from(step);
@@ -159,18 +160,6 @@ fn rings(text: &mut String, division_um: f64) -> std::fmt::Result {
             text,
             "<circle cx=\"{middle}\" cy=\"{middle}\" r=\"{radius:.1}\" fill=\"none\" stroke=\"currentColor\" stroke-opacity=\"{strength}\"/>"
         )?;
-        if step % 4 == 0 {
-            // Between the axes, where traces of both senses seldom leap.
-            let (x, y) = place(std::f64::consts::FRAC_PI_4, divisions);
-            let deviation_um = f64::from(step) * division_um;
-            let sign = if step > 0 { "+" } else { "" };
-            write!(
-                text,
-                "<text class=\"ring\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{sign}{}</text>",
-                y + 5.0,
-                short_of_ring(deviation_um)
-            )?;
-        }
     }
     write!(
         text,
@@ -180,6 +169,23 @@ fn rings(text: &mut String, division_um: f64) -> std::fmt::Result {
         middle - REACH_PX,
         middle + REACH_PX
     )
+}
+
+/// The deviation of every fourth ring, above the traces.
+fn ring_labels(text: &mut String, division_um: f64) -> std::fmt::Result {
+    for step in (-RINGS..=RINGS).step_by(4) {
+        // Between the axes, where traces of both senses seldom leap.
+        let (x, y) = place(std::f64::consts::FRAC_PI_4, NOMINAL + f64::from(step));
+        let deviation_um = f64::from(step) * division_um;
+        let sign = if step > 0 { "+" } else { "" };
+        write!(
+            text,
+            "<text class=\"ring\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{sign}{}</text>",
+            y + 5.0,
+            short_of_ring(deviation_um)
+        )?;
+    }
+    Ok(())
 }
 
 /// A multiple of four divisions without needless zeros, µm.

@@ -10,8 +10,10 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::screen::{Screen, compensated};
+use super::screen::{Screen, Tile, Tone, compensated};
 use super::section::{Rows, Section, head, um};
+use super::svg::short;
+use super::vectors::{self, Field};
 use crate::evidence::Verification;
 
 /// Sizes of the errors, or of what (1) leaves of them, ascending, mm.
@@ -133,17 +135,59 @@ pub fn screen(verifications: &[Verification]) -> Screen {
     let acted = |wanted: bool| seen().rfind(|v| v.is_compensated == wanted);
     let p95_mm = |verification| quantile_mm(&sizes_mm(verification, false), 0.95);
     let n = |verification: &Verification| verification.poses.len();
-    if let (Some(without), Some(with)) = (find("without"), find("with compensation")) {
-        return compensated(p95_mm(without), p95_mm(with), &format!("{} poses", n(with)));
+    let (pair, what) = match (find("without"), find("with compensation")) {
+        (Some(without), Some(with)) => ((without, with), format!("{} poses", n(with))),
+        _ => match (acted(false), acted(true)) {
+            (Some(without), Some(with)) if n(without) == n(with) => {
+                let labels = format!("{}, {}", without.label, with.label);
+                ((without, with), format!("{} poses: {labels}", n(with)))
+            }
+            _ => return Screen::default(),
+        },
+    };
+    let mut screen = compensated(p95_mm(pair.0), p95_mm(pair.1), &what);
+    screen.tiles.extend(about_datum(pair));
+    screen.picture = picture(pair);
+    screen
+}
+
+/// The tool error about a datum without and with compensation, as a tile; `None` where poses have none.
+fn about_datum((without, with): (&Verification, &Verification)) -> Option<Tile> {
+    let p95_mm = |verification| quantile_mm(&sizes_mm(verification, true), 0.95);
+    let (before_mm, after_mm) = (p95_mm(without), p95_mm(with));
+    if !(before_mm.is_finite() && after_mm.is_finite()) {
+        return None;
     }
-    match (acted(false), acted(true)) {
-        (Some(without), Some(with)) if n(without) == n(with) => {
-            let labels = format!("{}, {}", without.label, with.label);
-            let what = format!("{} poses: {labels}", n(with));
-            compensated(p95_mm(without), p95_mm(with), &what)
-        }
-        _ => Screen::default(),
-    }
+    let is_less = after_mm < before_mm;
+    let value = format!("{} → {} µm", short(before_mm * 1e3), short(after_mm * 1e3));
+    let more = "p95; what a part has that is set up on the machine: shift and turn of all poses are taken out";
+    Some(
+        Tile::new("about a datum set on the machine", value, more).toned(if is_less {
+            Tone::Good
+        } else {
+            Tone::Bad
+        }),
+    )
+}
+
+/// Error vectors about a datum over the volume, without and with compensation; `None` where the poses fill no volume.
+fn picture((without, with): (&Verification, &Verification)) -> Option<maud::Markup> {
+    let field = |verification: &Verification, name: &str| {
+        let errors = residuals_mm(verification)?;
+        let places = verification.poses.iter().map(|pose| pose.commanded_mm);
+        Some(Field {
+            name: name.to_owned(),
+            arrows: places.zip(errors).collect(),
+        })
+    };
+    let fields = [
+        field(without, "without compensation")?,
+        field(with, "with compensation")?,
+    ];
+    vectors::picture(
+        &fields,
+        "True error of the tool about a datum set on the machine",
+    )
 }
 
 fn figures(verification: &Verification) -> serde_json::Value {
@@ -195,7 +239,9 @@ mod tests {
         let section = section(&[moved.clone(), stretched.clone()]).unwrap();
         assert_eq!(section.lines.len(), 2, "{:?}", section.lines);
         let screen = super::screen(&[moved.clone(), stretched.clone()]);
-        assert!(screen.verdict.is_some() && screen.tiles.len() == 1);
+        assert!(screen.verdict.is_some() && screen.picture.is_some());
+        assert_eq!(screen.tiles[1].value, "0 → 2.00 µm");
+        assert_eq!(screen.tiles[1].tone, Tone::Bad);
         assert!(super::screen(&[moved]).verdict.is_none());
         let named = |label: &str, is_compensated| Verification {
             label: label.to_owned(),

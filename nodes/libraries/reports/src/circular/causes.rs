@@ -1,10 +1,13 @@
 //! The causes of circles, with what the scatter of the fit and the instruments leave open of them.
 
 use iso230::breakdown::{Alias, Instrument as Errors, Needed, PlaneBreakdown, Row, RowKey, Unit};
+use metrology::Axis;
 use metrology::sample::TestPlane;
 use metrology::squareness::{between, in_words};
 
-use super::super::section::{Rows, Section, head, rounded, um};
+use super::super::bars::{self, Bar};
+use super::super::screen::Tile;
+use super::super::section::{Drawing, Rows, Section, head, rounded, um};
 use super::scale::Expansion;
 use crate::evaluate::circle_reading::CircleReading;
 use crate::evaluate::circles::{Instrument, plane_axes};
@@ -13,6 +16,9 @@ use crate::evaluate::circles::{Instrument, plane_axes};
 const COVERAGE: f64 = 2.0;
 /// Probability above which a row may be chance.
 const BY_CHANCE: f64 = 0.01;
+/// Most causes of the answer, and of the drawing.
+const MOST_IN_ANSWER: usize = 3;
+const MOST_BARS: usize = 8;
 /// What a scatter lacks.
 pub const SCATTER_ALONE: &str = "What the instruments themselves are off by is not in them.";
 
@@ -92,12 +98,13 @@ pub fn section(
 ) -> Section {
     let [u, v] = plane.axes;
     let mut section = Section::new(format!("Causes in {u}{v}, {state}"));
-    section.answer(format!(
-        "{} recordings, greatest circular error G of a sense {} µm; what no row explains has {:.2} µm standard deviation.",
-        plane.recordings.len(),
-        um(greatest_mm.unwrap_or(plane.worst_circularity_mm)),
-        plane.noise.residual_mm * 1e3
-    ));
+    let greatest = um(greatest_mm.unwrap_or(plane.worst_circularity_mm));
+    let ranked = beyond(plane);
+    section.answer(answer(plane, &ranked, &greatest));
+    section.tile = ranked
+        .first()
+        .map(|row| tile(row, &ranked, [u, v], &greatest));
+    section.drawings.extend(drawing(plane));
     let (lines, scale_at_20_degc) = expansion.state(plane);
     section.lines.extend(lines);
     section.lines.push(read.in_words(plane));
@@ -141,6 +148,69 @@ pub fn section(
         "scale_at_20_degc": scale_at_20_degc,
     });
     section
+}
+
+/// The largest causes, the greatest G and the rest.
+fn answer(plane: &PlaneBreakdown, ranked: &[&Row], greatest: &str) -> String {
+    let largest: Vec<String> = { ranked.iter() }
+        .take(MOST_IN_ANSWER)
+        .map(|row| sized(row))
+        .collect();
+    let largest = match largest.as_slice() {
+        [] => "No cause is beyond chance and its U".to_owned(),
+        [one] => format!("Largest cause: {one}"),
+        several => format!("Largest causes: {}", several.join(", ")),
+    };
+    format!(
+        "{largest}; greatest circular error G of a sense {greatest} µm in {} recordings, of which no cause explains {:.2} µm (standard deviation).",
+        plane.recordings.len(),
+        plane.noise.residual_mm * 1e3
+    )
+}
+
+/// Causes that are neither chance nor what the instrument may have made, the largest first.
+fn beyond(plane: &PlaneBreakdown) -> Vec<&Row> {
+    let mut rows: Vec<&Row> = plane.rows.iter().filter(|row| is_beyond(row)).collect();
+    rows.sort_by(|a, b| b.peak_to_peak_mm.total_cmp(&a.peak_to_peak_mm));
+    rows
+}
+
+fn is_beyond(row: &Row) -> bool {
+    row.chance < BY_CHANCE && row.value.abs() > COVERAGE * row.standard_uncertainty
+}
+
+/// A cause with its value and U.
+fn sized(row: &Row) -> String {
+    let value = with_unit(row.value, row.standard_uncertainty, row.unit);
+    format!("{} {value}", row.name)
+}
+
+/// The largest cause on the first screen.
+fn tile(row: &Row, ranked: &[&Row], [u, v]: [Axis; 2], greatest: &str) -> Tile {
+    let next = ranked.get(1).map_or_else(String::new, |next| {
+        format!("; next {}, {} µm", next.name, um(next.peak_to_peak_mm))
+    });
+    let more = format!(
+        "makes {} µm alone, G is {greatest} µm{next}",
+        um(row.peak_to_peak_mm)
+    );
+    Tile::new(&format!("largest cause in {u}{v}"), sized(row), more)
+}
+
+/// The causes by what each makes alone; `None` without any.
+fn drawing(plane: &PlaneBreakdown) -> Option<Drawing> {
+    let mut rows: Vec<&Row> = plane.rows.iter().collect();
+    rows.sort_by(|a, b| b.peak_to_peak_mm.total_cmp(&a.peak_to_peak_mm));
+    let bar = |row: &&Row| Bar {
+        name: sized(row),
+        size: row.peak_to_peak_mm * 1e3,
+        is_beyond: is_beyond(row),
+    };
+    let bars: Vec<Bar> = rows.iter().take(MOST_BARS).map(bar).collect();
+    (!bars.is_empty()).then(|| Drawing {
+        svg: bars::svg("span that each cause makes alone / µm", &bars),
+        caption: "Largest causes with U (k = 2). Faint: not beyond chance or U.".to_owned(),
+    })
 }
 
 /// A part with one decimal, and no minus before a zero.
@@ -210,7 +280,7 @@ fn needed(plane: &PlaneBreakdown) -> String {
         .chain(&plane.unseen);
     let words: Vec<String> = tied.map(asks).collect();
     if words.is_empty() {
-        "Every row is told apart from the others.".to_owned()
+        "Every row is separated from the others.".to_owned()
     } else {
         words.join(" ")
     }
@@ -230,7 +300,7 @@ fn asks(alias: &Alias) -> String {
         words.join(" and ")
     });
     format!(
-        "{} is told apart by {}.",
+        "{} needs {} to be separated.",
         alias.name,
         ways.collect::<Vec<_>>().join(", or by ")
     )

@@ -18,6 +18,7 @@ mod turn;
 
 use turn::{AtFeed, Tick};
 pub use turn::{EvaluatedTurn, SETTLING_S, TurnBy};
+pub(super) use turn::{FEWEST_SPARSE, SPARSE, median};
 
 /// The command is on the circle when it is this close to it, mm.
 const ON_CIRCLE_MM: f64 = 2e-3;

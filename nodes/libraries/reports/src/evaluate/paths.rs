@@ -8,12 +8,17 @@
 //! The plate counts from where it was zeroed, which nothing states: s is that place. A lag along the path is no deviation from it,
 //! so that (2) holds where a mean of commanded minus read places would be off by the lag. p_i and s follow from each other and are
 //! found in turn.
+//!
+//! A program moves to its path and away from it, and the axes settle on a run-in. `(rate: full)` stands before the evaluated part,
+//! `(rate: background)` behind it, and a control that reads these comments publishes its states closer in between: evaluated is
+//! the longest stretch of close states, where sparse ones come before it. A recording without them is evaluated as a whole.
 
 use metrology::Axis;
 use metrology::sample::{AxisState, GridSample, TestKind, TestPlane, TestSegment};
+use metrology::stamp::{Host, Machine, Stamp};
 use nalgebra::{Matrix2, Vector2};
 
-use super::circles::plane_axes;
+use super::circles::{FEWEST_SPARSE, SPARSE, median, plane_axes};
 
 /// Kinds of paths that are no whole circle.
 const KINDS: [TestKind; 6] = [
@@ -40,7 +45,7 @@ const DETERMINED: f64 = 1e-6;
 /// A reading on a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathPoint {
-    /// Way of the command since the begin, mm.
+    /// Way of the command since the begin of the evaluated part, mm.
     pub along_mm: f64,
     /// Distance from the commanded path, to the left of the motion positive, mm.
     pub deviation_mm: f64,
@@ -55,6 +60,17 @@ pub struct PathRecording {
     pub points: Vec<PathPoint>,
     /// Readings beyond the most that are kept.
     pub left_out: usize,
+    /// Readings of run-in and run-out that are not among the points; `None` where the recording does not mark its evaluated part.
+    pub run_in: Option<usize>,
+}
+
+/// A reading of the plate.
+#[derive(Clone, Copy, Debug)]
+struct Reading {
+    at: Stamp<Host>,
+    /// Number of the command before it.
+    command: usize,
+    place_mm: Vector2<f64>,
 }
 
 #[derive(Debug)]
@@ -62,9 +78,12 @@ struct Current {
     segment: TestSegment,
     axes: [Axis; 2],
     commanded_mm: Vec<Vector2<f64>>,
-    /// Number of the command, and the place that was read, mm.
-    read: Vec<(usize, Vector2<f64>)>,
+    /// Each state: when it came, and how long after the one before by the controller's clock, s.
+    states: Vec<(Stamp<Host>, f64)>,
+    last_stamp: Option<Stamp<Machine>>,
+    read: Vec<Reading>,
     left_out: usize,
+    run_in: Option<usize>,
 }
 
 /// Collects the paths of a recording.
@@ -84,14 +103,18 @@ impl Paths {
                 segment: segment.clone(),
                 axes,
                 commanded_mm: Vec::new(),
+                states: Vec::new(),
+                last_stamp: None,
                 read: Vec::new(),
                 left_out: 0,
+                run_in: None,
             });
-        } else if let Some(current) = self.current.take()
+        } else if let Some(mut current) = self.current.take()
             && segment.completed
             && segment.run == current.segment.run
             && !current.read.is_empty()
         {
+            current.keep_evaluated();
             self.done.push(current);
         }
     }
@@ -101,6 +124,13 @@ impl Paths {
         let Some(current) = &mut self.current else {
             return;
         };
+        let stamp = state.controller_at;
+        if let Some(last) = current.last_stamp.replace(stamp)
+            && current.states.len() < MOST_READINGS
+        {
+            let step_s = (stamp - last).as_secs_f64();
+            current.states.push((state.received_at, step_s));
+        }
         let [u, v] = current.axes.map(|axis| state.commanded[axis]);
         let place = Vector2::new(u, v);
         let last = current.commanded_mm.last();
@@ -126,7 +156,11 @@ impl Paths {
             return;
         }
         if current.read.len() < MOST_READINGS {
-            current.read.push((last, place));
+            current.read.push(Reading {
+                at: sample.at,
+                command: last,
+                place_mm: place,
+            });
         } else {
             current.left_out += 1;
         }
@@ -162,6 +196,47 @@ struct Nearest {
 }
 
 impl Current {
+    /// Leaves out run-in and run-out, where the recording marks its evaluated part.
+    fn keep_evaluated(&mut self) {
+        let Some((from, until)) = self.evaluated() else {
+            return;
+        };
+        let n = self.read.len();
+        let is_evaluated = |reading: &Reading| reading.at >= from && reading.at <= until;
+        if self.read.iter().any(is_evaluated) {
+            self.read.retain(is_evaluated);
+            self.run_in = Some(n - self.read.len());
+        }
+    }
+
+    /// Begin and end of the longest stretch of close states behind sparse ones.
+    fn evaluated(&self) -> Option<(Stamp<Host>, Stamp<Host>)> {
+        let usual_s = median(self.states.iter().map(|(_, step_s)| *step_s))?;
+        let is_close = |state: &(Stamp<Host>, f64)| usual_s > 0.0 && state.1 <= SPARSE * usual_s;
+        let mut longest: Option<(usize, usize)> = None;
+        let mut begin = None;
+        for (k, state) in self.states.iter().enumerate() {
+            if !is_close(state) {
+                begin = None;
+                continue;
+            }
+            let first = *begin.get_or_insert(k);
+            if longest.is_none_or(|(a, b)| k - first > b - a) {
+                longest = Some((first, k));
+            }
+        }
+        let (first, last) = longest?;
+        let sparse = self
+            .states
+            .get(..first)?
+            .iter()
+            .filter(|one| !is_close(one));
+        // The step of the first close state began at the state before it.
+        let from = self.states.get(first.saturating_sub(1))?.0;
+        let until = self.states.get(last)?.0;
+        (sparse.count() >= FEWEST_SPARSE).then_some((from, until))
+    }
+
     /// Way of each command since the begin, mm.
     fn ways_mm(&self) -> Vec<f64> {
         let mut way_mm = 0.0;
@@ -216,19 +291,26 @@ impl Current {
 
     fn recording(&self, shift_mm: &Vector2<f64>) -> PathRecording {
         let ways_mm = self.ways_mm();
-        let point = |(about, read): &(usize, Vector2<f64>)| {
-            let place = read + shift_mm;
-            let nearest = self.nearest(&ways_mm, *about, &place)?;
+        let point = |reading: &Reading| {
+            let place = reading.place_mm + shift_mm;
+            let nearest = self.nearest(&ways_mm, reading.command, &place)?;
             Some(PathPoint {
                 along_mm: nearest.along_mm,
                 // (1)
                 deviation_mm: nearest.normal.dot(&(place - nearest.place_mm)),
             })
         };
+        let mut points: Vec<PathPoint> = self.read.iter().filter_map(point).collect();
+        // The way counts from the begin of the evaluated part.
+        let begin_mm = points.first().map_or(0.0, |point| point.along_mm);
+        for point in &mut points {
+            point.along_mm -= begin_mm;
+        }
         PathRecording {
             segment: self.segment.clone(),
-            points: self.read.iter().filter_map(point).collect(),
+            points,
             left_out: self.left_out,
+            run_in: self.run_in,
         }
     }
 }
@@ -241,16 +323,16 @@ fn shift_mm(paths: &[&Current]) -> Vector2<f64> {
             .flat_map(|path| path.read.iter().map(move |read| (path, read)))
     };
     let n = pairs().count().max(1) as f64;
-    let apart = pairs().map(|(path, (k, read))| path.commanded_mm[*k] - read);
+    let apart = pairs().map(|(path, read)| path.commanded_mm[read.command] - read.place_mm);
     let mut shift = apart.sum::<Vector2<f64>>() / n;
     let ways: Vec<Vec<f64>> = paths.iter().map(|path| path.ways_mm()).collect();
     for _ in 0..ROUNDS {
         let (mut normal_matrix, mut right) = (Matrix2::zeros(), Vector2::zeros());
         for (path, ways_mm) in paths.iter().zip(&ways) {
             // Some hundred readings of a path have all that two unknowns need.
-            for (k, read) in path.read.iter().step_by(1 + path.read.len() / 400) {
-                let place = read + shift;
-                if let Some(near) = path.nearest(ways_mm, *k, &place) {
+            for read in path.read.iter().step_by(1 + path.read.len() / 400) {
+                let place = read.place_mm + shift;
+                if let Some(near) = path.nearest(ways_mm, read.command, &place) {
                     normal_matrix += near.normal * near.normal.transpose();
                     right += near.normal * near.normal.dot(&(near.place_mm - place));
                 }
@@ -293,14 +375,21 @@ mod tests {
             } else {
                 Vector2::zeros()
             };
-            (k, late + left + Vector2::new(-7.0, 3.0))
+            Reading {
+                at: Stamp::from_nanos(k as i64 * 1_000_000),
+                command: k,
+                place_mm: late + left + Vector2::new(-7.0, 3.0),
+            }
         };
         Current {
             segment: TestSegment::of_kind(TestKind::Corner, 1, Stamp::default()),
             axes: [Axis::X, Axis::Y],
             commanded_mm: (0..3000).map(at).collect(),
+            states: Vec::new(),
+            last_stamp: None,
             read: (0..3000).step_by(7).map(read).collect(),
             left_out: 0,
+            run_in: None,
         }
     }
 
@@ -323,6 +412,36 @@ mod tests {
         let off = corner(0.004).recording(&Vector2::new(7.0, -3.0));
         let early = off.points[40];
         assert!((early.deviation_mm - 0.004).abs() < 1e-9, "{early:?}");
+    }
+
+    #[test]
+    fn the_way_to_the_path_is_no_part_of_it() {
+        let mut path = corner(0.0);
+        // Half a micrometre beside the path, but 50 beside it on the way there, at a tenth of the rate.
+        for reading in &mut path.read {
+            let is_run_in = reading.command < 1000;
+            reading.place_mm.y += if is_run_in { 0.05 } else { 0.0005 };
+        }
+        let at = |k: i64| Stamp::from_nanos(k * 1_000_000);
+        let sparse = (1..=100).map(|k| (at(10 * k), 0.01));
+        let close = (1001..3000).map(|k| (at(k), 0.001));
+        path.states = sparse.chain(close).collect();
+        let n = path.read.len();
+        path.keep_evaluated();
+        let left_out = path.run_in.unwrap();
+        assert!((140..=145).contains(&left_out), "{left_out}");
+        assert_eq!(path.read.len() + left_out, n);
+        let recording = path.recording(&shift_mm(&[&path]));
+        let greatest = { recording.points.iter() }
+            .map(|p| p.deviation_mm.abs())
+            .fold(0.0, f64::max);
+        assert!(greatest < 2e-3, "{greatest}");
+        assert!(recording.points[0].along_mm.abs() < 1e-12);
+        // States of one rate mark nothing.
+        let mut whole = corner(0.0);
+        whole.states = (0..3000).map(|k| (at(k), 0.001)).collect();
+        whole.keep_evaluated();
+        assert_eq!((whole.run_in, whole.read.len()), (None, n));
     }
 
     #[test]

@@ -2,10 +2,11 @@
 
 use gap_diagnosis::report::{Cause, GapReport, NextExperiment, Status};
 
-use super::words::name;
-use super::{NOT_DETERMINED, spoken, three, told};
+use super::sentences::since;
+use super::words::{in_units, name};
+use super::{NOT_DETERMINED, separated, spoken_key, three, told};
 use crate::screen::{Screen, Tile, Tone};
-use crate::svg::short;
+use crate::section::{capitalised, rounded};
 
 /// Share of the gap that is closed from which on a diagnosis is done.
 const MOSTLY_CLOSED: f64 = 0.5;
@@ -44,29 +45,28 @@ fn main_cause(report: &GapReport) -> Option<&Cause> {
     largest
 }
 
-/// The size of a cause with its uncertainty, such as `width_mm 0.0041 ± 0.0002`.
-fn size(cause: &Cause) -> String {
-    let Some(first) = told(cause).next() else {
-        return String::new();
-    };
+/// The first parameter of a cause: what it is, and its value with the half of its interval, such as `6.36 ± 0.09 µm`.
+fn size(cause: &Cause) -> Option<(String, String)> {
+    let first = told(cause).next()?;
+    let (label, factor, unit) = in_units(spoken_key(&first.name), first.value);
     if first.determined == Some(false) {
-        return format!("{} {NOT_DETERMINED}", spoken(&first.name));
+        return Some((label, NOT_DETERMINED.to_owned()));
     }
     let half = (first.high - first.low) / 2.0;
-    // Lengths of the machine file in mm are µm for people.
-    let (label, factor, unit) = match first.name.strip_suffix("_mm") {
-        Some(name) => (spoken(name), 1e3, " µm"),
-        None => match first.name.strip_suffix("_um") {
-            Some(name) => (spoken(name), 1.0, " µm"),
-            None => (spoken(&first.name), 1.0, ""),
-        },
-    };
-    format!(
-        "{} {} ± {}{unit}",
-        label.replace('_', " "),
-        short(first.value * factor),
-        short(half * factor)
-    )
+    let (value, half) = rounded(first.value * factor, half * factor);
+    Some((
+        label,
+        format!("{value} ± {half} {unit}").trim_end().to_owned(),
+    ))
+}
+
+/// A cause with its size where it is one number.
+fn sized(cause: &Cause) -> String {
+    let title = name(&cause.effect, &cause.axis);
+    match size(cause) {
+        Some((_, value)) if told(cause).count() == 1 => format!("{title} {value}"),
+        _ => title,
+    }
 }
 
 fn verdict(report: &GapReport) -> (String, Tone) {
@@ -88,38 +88,33 @@ fn verdict(report: &GapReport) -> (String, Tone) {
         );
         return (line, Tone::Bad);
     };
-    let title = name(&cause.effect, &cause.axis);
-    let rest = match report
-        .causes
-        .iter()
-        .filter(|c| c.status != Status::Surrogate)
-        .count()
-    {
-        0 | 1 => String::new(),
-        n => format!(" and {} more", n - 1),
+    let title = format!("{}{}", sized(cause), since(report, cause));
+    let others = report.causes.iter();
+    let n = others.filter(|c| c.status != Status::Surrogate).count();
+    let (rest, closes) = match n {
+        0 | 1 => (String::new(), "closes"),
+        2 => (" and 1 more cause".to_owned(), "close"),
+        n => (format!(" and {} more causes", n - 1), "close"),
     };
-    match share {
-        Some(share) => (
-            format!(
-                "{title}{rest} close {:.0} % of the gap between machine and simulator ({} to {} µm rms).",
-                100.0 * share.value,
-                super::maybe(report.shrink.rms_um.before),
-                super::maybe(report.shrink.rms_um.after)
-            ),
-            if share.low > MOSTLY_CLOSED {
-                Tone::Good
-            } else {
-                Tone::Plain
-            },
-        ),
-        None => (
-            format!(
-                "Machine and simulator differ by {} µm rms; {title}{rest} is named as the cause.",
-                three(gap.rms_um)
-            ),
-            Tone::Plain,
-        ),
-    }
+    let Some(share) = share else {
+        let line = format!(
+            "Machine and simulator differ by {} µm rms; {title}{rest} is named as the cause.",
+            three(gap.rms_um)
+        );
+        return (line, Tone::Plain);
+    };
+    let line = format!(
+        "{title}{rest} {closes} {:.0} % of the gap between machine and simulator, from {} to {} µm rms.",
+        100.0 * share.value,
+        super::maybe(report.shrink.rms_um.before),
+        super::maybe(report.shrink.rms_um.after)
+    );
+    let tone = if share.low > MOSTLY_CLOSED {
+        Tone::Good
+    } else {
+        Tone::Plain
+    };
+    (capitalised(&line), tone)
 }
 
 fn closed(report: &GapReport) -> Option<Tile> {
@@ -157,8 +152,18 @@ fn largest(report: &GapReport) -> Tile {
                 Status::Set => ", or one that looks alike",
                 _ => "",
             };
-            let more = format!("{}; confidence {:.2}{doubt}", size(cause), cause.confidence);
-            Tile::new("largest cause", name(&cause.effect, &cause.axis), more)
+            let size = match size(cause) {
+                Some((label, _)) if told(cause).count() == 1 => format!("{label}; 95 %; "),
+                Some((label, value)) => format!("{label} {value}; 95 %; "),
+                None => String::new(),
+            };
+            let since = since(report, cause);
+            let since = match since.trim_start() {
+                "" => String::new(),
+                since => format!("{since}; "),
+            };
+            let more = format!("{size}{since}confidence {:.2}{doubt}", cause.confidence);
+            Tile::new("largest cause", sized(cause), more)
         }
         None => Tile::new("largest cause", "none named", "see what to measure next"),
     }
@@ -193,14 +198,10 @@ fn lacks(report: &GapReport, losses: &[String]) -> Vec<String> {
 }
 
 fn next(experiment: &NextExperiment) -> Tile {
-    let more = format!(
-        "{}; separates {}",
-        experiment.run,
-        experiment.separates.join(" / ")
-    );
+    let more = format!("{}; separates {}", experiment.run, separated(experiment));
     Tile::new(
         "next step",
-        format!("{} min", three(experiment.minutes)),
+        format!("{:.0} min", experiment.minutes.ceil()),
         more,
     )
 }
@@ -259,13 +260,29 @@ mod tests {
         let screen = of(&report, &[]);
         let (verdict, tone) = screen.verdict.unwrap();
         assert!(
-            verdict.contains("squareness XY (EC0Y) and 1 more close 93 %"),
+            verdict.contains("Squareness XY (EC0Y) 40.0 ± 2.0 µrad and 1 more cause close 93 %"),
             "{verdict}"
         );
         assert_eq!(tone, Tone::Good);
-        assert_eq!(size(&report.causes[0]), "width 4.00 ± 0.200 µm");
+        assert_eq!(sized(&report.causes[0]), "backlash X 4.00 ± 0.20 µm");
+        assert_eq!(
+            screen.tiles[1].value,
+            "squareness XY (EC0Y) 40.0 ± 2.0 µrad"
+        );
         assert_eq!(screen.tiles[0].value, "93 %");
-        assert_eq!(screen.next.unwrap().value, "4.00 min");
+        assert_eq!(screen.next.unwrap().value, "4 min");
+    }
+
+    #[test]
+    fn one_cause_closes_the_gap() {
+        let closed = json!({"value": 0.95, "low": 0.9, "high": 0.97});
+        let causes = json!([cause("backlash", "X", "width_um", 5.58)]);
+        let report = report(true, causes, shrink(closed, json!([])));
+        let (verdict, _) = of(&report, &[]).verdict.unwrap();
+        assert_eq!(
+            verdict,
+            "Backlash X 5.58 ± 0.28 µm closes 95 % of the gap between machine and simulator, from 3.00 to 0.800 µm rms."
+        );
     }
 
     #[test]

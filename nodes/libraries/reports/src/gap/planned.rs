@@ -3,7 +3,7 @@
 use gap_diagnosis::preflight::{Foreseen, IMITATED, Preflight, WANTED_REPEATS};
 use maud::html;
 
-use super::{matrix, name, section, three};
+use super::{look_alikes, name, section, three};
 use crate::Report;
 use crate::screen::Screen;
 use crate::section::Section;
@@ -44,10 +44,9 @@ pub fn page(title: &str, forecast: &Preflight, rehearsed: &Rehearsed<'_>) -> Rep
         screen: Screen::default(),
         body: html! {
             h2 { (title) }
-            (matrix::style())
             @for line in &lines { p { (line) } }
             @for section in &sections { (section.html()) }
-            (matrix::isolability(&forecast.isolability))
+            @if let Some(section) = look_alikes::section(&forecast.isolability) { (section.html()) }
         },
         figures: serde_json::json!({
             "minutes": rehearsed.minutes,

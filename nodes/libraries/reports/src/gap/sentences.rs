@@ -100,7 +100,7 @@ fn cause(report: &GapReport) -> String {
 }
 
 /// From which run on an effect is there, where it was not from the begin.
-fn since(report: &GapReport, cause: &Cause) -> String {
+pub(super) fn since(report: &GapReport, cause: &Cause) -> String {
     let named = report
         .causes
         .iter()

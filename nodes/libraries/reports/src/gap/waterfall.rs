@@ -114,9 +114,27 @@ fn drawn(bars: &[Bar], floor_um: f64) -> Result<String, std::fmt::Error> {
         "<svg class=\"plot\" role=\"img\" aria-label=\"waterfall of the gap\" viewBox=\"0 0 {WIDTH} {height}\">"
     );
     for (row, bar) in bars.iter().enumerate() {
-        let top = row as f64 * ROW_PX;
         let (a, b) = (scale.px(bar.from_um), scale.px(bar.to_um));
         let (left, width) = (a.min(b), (a - b).abs().max(2.0));
+        write!(
+            text,
+            "<g class=\"c{}\"><rect x=\"{left:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"18\" fill=\"currentColor\"/></g>",
+            bar.colour,
+            row as f64 * ROW_PX + 34.0,
+        )?;
+    }
+    let at = scale.px(floor_um);
+    let bottom = ROW_PX * bars.len() as f64;
+    write!(
+        text,
+        "<path stroke=\"currentColor\" stroke-dasharray=\"5 4\" d=\"M{at:.1} 26V{:.1}\"/><text x=\"{:.1}\" y=\"{:.1}\">floor {} µm</text>",
+        bottom + 6.0,
+        at.min(WIDTH - 220.0),
+        bottom + 28.0,
+        short(floor_um)
+    )?;
+    // Names stand above the line of the floor.
+    for (row, bar) in bars.iter().enumerate() {
         let change = bar.to_um - bar.from_um;
         let size = short(change.abs());
         let sign = match bar.from_um > 0.0 && size != "0" {
@@ -126,24 +144,13 @@ fn drawn(bars: &[Bar], floor_um: f64) -> Result<String, std::fmt::Error> {
         };
         write!(
             text,
-            "<text x=\"{}\" y=\"{:.1}\">{}: {sign}{size} µm</text><g class=\"c{}\"><rect x=\"{left:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"18\" fill=\"currentColor\"/></g>",
+            "<text class=\"halo\" x=\"{}\" y=\"{:.1}\">{}: {sign}{size} µm</text>",
             BARS_PX[0],
-            top + 26.0,
+            row as f64 * ROW_PX + 26.0,
             escaped(&bar.name),
-            bar.colour,
-            top + 34.0,
         )?;
     }
-    let at = scale.px(floor_um);
-    let bottom = ROW_PX * bars.len() as f64;
-    write!(
-        text,
-        "<path stroke=\"currentColor\" stroke-dasharray=\"5 4\" d=\"M{at:.1} 26V{:.1}\"/><text x=\"{:.1}\" y=\"{:.1}\">floor {} µm</text></svg>",
-        bottom + 6.0,
-        at.min(WIDTH - 220.0),
-        bottom + 28.0,
-        short(floor_um)
-    )?;
+    text.push_str("</svg>");
     Ok(text)
 }
 

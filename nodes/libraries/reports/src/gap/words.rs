@@ -11,6 +11,9 @@ pub(super) fn name(effect: &str, axis: &str) -> String {
     let Some(kind) = effects::kind(effect) else {
         return format!("{effect} {axis}").trim_end().to_owned();
     };
+    if axis.is_empty() {
+        return kind.title.to_owned();
+    }
     let place = match kind.targets {
         Targets::Across
         | Targets::Turning
@@ -22,7 +25,46 @@ pub(super) fn name(effect: &str, axis: &str) -> String {
         }
         _ => axis.to_owned(),
     };
-    format!("{} {place}", kind.title).trim_end().to_owned()
+    format!("{} {place}", kind.title)
+}
+
+/// The same of an effect as figures call it, such as `backlash X`.
+pub(super) fn name_of(id: &str) -> String {
+    let (effect, axis) = id.split_once(' ').unwrap_or((id, ""));
+    name(effect, axis)
+}
+
+/// Ends of the names of amplitudes, the longer before those that they end in, each with its unit.
+const UNITS: [(&str, &str); 14] = [
+    ("_um_per_m_k", "µm/(m K)"),
+    ("_um_per_m", "µm/m"),
+    ("_um_per_h", "µm/h"),
+    ("_um_per_k", "µm/K"),
+    ("_um", "µm"),
+    ("_mm2", "mm²"),
+    ("_mm", "mm"),
+    ("_urad", "µrad"),
+    ("_ppm", "ppm"),
+    ("_ms", "ms"),
+    ("_min", "min"),
+    ("_hz", "Hz"),
+    ("_k", "K"),
+    ("_s", "s"),
+];
+/// Lengths below this are in µm for people, mm.
+const SHORT_MM: f64 = 0.1;
+
+/// An amplitude of a size in words: what it is, the factor to its unit, and the unit; such as `width`, 1, `µm`.
+pub(super) fn in_units(key: &str, value: f64) -> (String, f64, &'static str) {
+    let found = UNITS
+        .into_iter()
+        .find_map(|(end, unit)| Some((key.strip_suffix(end)?, unit)));
+    let (label, unit) = found.unwrap_or((key, ""));
+    let (factor, unit) = match unit {
+        "mm" if value.abs() < SHORT_MM => (1e3, "µm"),
+        unit => (1.0, unit),
+    };
+    (label.replace('_', " "), factor, unit)
 }
 
 /// The angle between two linear axes such as `XY`.
@@ -52,7 +94,7 @@ pub(super) fn covariate(id: &str) -> String {
     }
     if let Some(letter) = id.strip_prefix("sense*log_distance_since_reversal_") {
         return format!(
-            "the way since {} turned round, its sign with the direction of motion",
+            "the way since {} reversed, with the sign of the motion",
             axis(letter)
         );
     }
@@ -61,7 +103,7 @@ pub(super) fn covariate(id: &str) -> String {
     }
     match id {
         "angle" => "the angle on the circle".to_owned(),
-        "sense*angle" => "the angle on the circle, its sign with the sense of rotation".to_owned(),
+        "sense*angle" => "the angle on the circle, with the sign of the sense".to_owned(),
         "approach_angle" => "the direction of approach".to_owned(),
         "feed" => "the feed of the touch".to_owned(),
         "stylus" => "the stylus".to_owned(),
@@ -104,10 +146,27 @@ mod tests {
     use super::*;
 
     #[test]
+    fn an_amplitude_has_its_unit_and_no_underscore() {
+        for (key, value, wanted) in [
+            ("width_um", 6.4, ("width", 1.0, "µm")),
+            ("rate_um_per_h", -5.5, ("rate", 1.0, "µm/h")),
+            ("growth_um_per_m", 20.0, ("growth", 1.0, "µm/m")),
+            ("width_mm", 0.004, ("width", 1e3, "µm")),
+            ("period_mm", 10.0, ("period", 1.0, "mm")),
+            ("fixed_end", 1.0, ("fixed end", 1.0, "")),
+        ] {
+            let (label, factor, unit) = in_units(key, value);
+            assert_eq!((label.as_str(), factor, unit), wanted, "{key}");
+        }
+    }
+
+    #[test]
     fn components_have_their_symbols_and_covariates_are_words() {
         assert_eq!(name("straightness", "YX"), "straightness EYX");
         assert_eq!(name("squareness", "XY"), "squareness XY (EC0Y)");
         assert_eq!(name("backlash", "X"), "backlash X");
+        assert_eq!(name("straightness", ""), "straightness");
+        assert_eq!(name_of("squareness XY"), "squareness XY (EC0Y)");
         assert_eq!(signs([("backlash", "X")].into_iter()), None);
         let pairs = [
             ("squareness", "XZ"),
@@ -122,7 +181,7 @@ mod tests {
         );
         assert_eq!(name("probe_latency", ""), "latency of the probe signal");
         assert_eq!(covariate("position_y"), "the position of Y");
-        assert!(covariate("sense*log_distance_since_reversal_x").contains("since X turned"));
+        assert!(covariate("sense*log_distance_since_reversal_x").contains("since X reversed"));
         assert_eq!(covariate("time"), "time");
         assert_eq!(feed_exponent(-0.04), "does not depend on feed");
         assert!(feed_exponent(0.96).contains("1.0"));

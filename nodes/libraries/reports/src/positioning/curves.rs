@@ -23,6 +23,8 @@ fn mean_and_s(values_um: &[f64]) -> (f64, f64) {
 /// When the plot cannot be drawn.
 pub(super) fn drawing(runs: &PositioningRuns) -> Result<Drawing> {
     let (mut traces, mut bands, mut readings) = (vec![], vec![], vec![]);
+    // A side has one colour: its readings, their mean and the band.
+    let mut colours = vec![];
     for (name, all) in [("up", &runs.up_mm), ("down", &runs.down_mm)] {
         if all.is_empty() {
             continue;
@@ -43,6 +45,7 @@ pub(super) fn drawing(runs: &PositioningRuns) -> Result<Drawing> {
                 .map(|(t, (m, s))| (*t, m - BAND * s, m + BAND * s))
                 .collect(),
         });
+        colours.push(traces.len());
         traces.push(Trace {
             name: format!("mean {name}"),
             points: found.iter().map(|(t, (m, _))| (*t, *m)).collect(),
@@ -57,14 +60,15 @@ pub(super) fn drawing(runs: &PositioningRuns) -> Result<Drawing> {
     }
     bands.retain(|band| band.points.iter().any(|point| point.1.is_finite()));
     traces.extend(readings);
+    colours.extend(colours.clone());
     let plot = Plot {
         x: "target / mm".to_owned(),
         y: "deviation / µm".to_owned(),
         traces,
     };
     Ok(Drawing {
-        svg: plot::banded_svg(&plot, &bands)?,
-        caption: "Deviation at each target, from each side: every reading, their mean, and two standard deviations about it. The mean of all is taken out."
+        svg: plot::paired_svg(&plot, &bands, &colours)?,
+        caption: "Deviation at each target, from each side: every reading, their mean, and two standard deviations s about it. The mean of all is taken out."
             .to_owned(),
     })
 }

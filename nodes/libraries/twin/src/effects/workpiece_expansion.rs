@@ -51,7 +51,7 @@ pub static KIND: Kind = Kind {
     ],
     moment: Moment::Mean,
     wanders: 0.0,
-    needs: "touches at two places and a thermometer in the shop that is not at 20 degC",
+    needs: "touches at two places and a thermometer in the shop that is not at 20 °C",
     build: |_, values| {
         let common = values[0];
         Box::new(WorkpieceExpansion {

@@ -24,9 +24,9 @@ use serde::Serialize;
 /// Time at feed after which readings count where no rate marks the turn, s.
 pub const SETTLING_S: f64 = 0.5;
 /// A state is sparse when it comes this many times later than the usual one.
-const SPARSE: f64 = 1.5;
+pub(crate) const SPARSE: f64 = 1.5;
 /// Sparse states at feed before the turn, at least: one alone may be a lost message.
-const FEWEST_SPARSE: usize = 2;
+pub(crate) const FEWEST_SPARSE: usize = 2;
 /// Rounding of the swept angle, rad.
 const SAME_RAD: f64 = 1e-6;
 
@@ -163,7 +163,8 @@ fn settled(readings: &[AtFeed]) -> (TurnBy, Part) {
     }
 }
 
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+/// The middle of the finite values.
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.filter(|value| value.is_finite()).collect();
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
