@@ -52,7 +52,8 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
     planes.sort_unstable();
     let lead_mm = [5.0, 8.0, 10.0, 12.0, 16.0, 20.0][random.random_range(0..6)];
     let tables = tables(random, &planes);
-    let floor = Floor::draw(random, [0.05, 0.5], [0.03, 0.3]);
+    let memory = random.random_range(0.5..0.95);
+    let floor = Floor::draw(random, [0.1, 0.6], [0.05, 0.4]).with_memory(memory);
     let courses: Vec<Vec<f64>> = circles(&tables)
         .map(|circle| {
             circle
@@ -123,8 +124,9 @@ fn tables(random: &mut Pcg64Mcg, planes: &[usize]) -> Vec<Mounted> {
                 .min(80.0),
         );
     }
-    let repeats: usize = random.random_range(1..=3);
-    let rows = [240, 360, 720, 900][random.random_range(0..4)];
+    let most = if planes.len() * feeds.len() > 3 { 2 } else { 3 };
+    let repeats: usize = random.random_range(1..=most);
+    let rows = [180, 240, 360][random.random_range(0..3)];
     let mut tables = vec![];
     for plane in planes {
         for feed_mm_s in &feeds {

@@ -18,6 +18,8 @@ use super::shape::Shape;
 const MIN_SHARE_LEFT: f64 = 0.5;
 /// Part of a wave that another one of any frequency may imitate.
 const MAX_SHARE_ALIASED: f64 = 0.75;
+/// Periods that targets have to span.
+const MIN_PERIODS: f64 = 2.0;
 /// Targets that a period needs.
 const MIN_PLACES_OF_A_PERIOD: usize = 12;
 
@@ -91,7 +93,11 @@ pub fn readings(random: &mut Pcg64Mcg, kind: Kind, stops: &[Stop], period_mm: f6
     targets.dedup_by(|next, kept| *next - *kept < 1e-6 * (high - low) + 0.01);
     let side = |stop: &Stop| if stop.is_up { -0.5 } else { 0.5 };
     match kind {
-        Kind::Lead => Shape::draw(random, targets.len()).bent(&course),
+        Kind::Lead => {
+            // Waves of a turn or two of the screw are its cyclic error.
+            let turns = (high - low) / period_mm;
+            Shape::draw(random, targets.len().min(1 + (2.0 * turns) as usize)).bent(&course)
+        }
         Kind::Scale => stops.iter().map(|stop| 1e-3 * stop.place_mm).collect(),
         Kind::LostMotion => stops.iter().map(side).collect(),
         Kind::WornNut => {
@@ -128,7 +134,7 @@ pub fn resolves(targets_mm: &[f64], period_mm: f64) -> bool {
         return false;
     };
     let (n, length) = (targets_mm.len(), high - low);
-    if n < MIN_PLACES_OF_A_PERIOD || length <= period_mm {
+    if n < MIN_PLACES_OF_A_PERIOD || length < MIN_PERIODS * period_mm {
         return false;
     }
     let wave = |cycles: f64| -> [Vec<f64>; 2] {
@@ -140,7 +146,8 @@ pub fn resolves(targets_mm: &[f64], period_mm: f64) -> bool {
     };
     let own = length / period_mm;
     let mut slower = vec![vec![1.0; n], targets_mm.to_vec()];
-    let most = (n as f64 / 4.0).min(0.8 * own);
+    // Waves that differ by less than one over the length are one.
+    let most = (n as f64 / 4.0).min(own - 1.0);
     let mut cycles = 0.5;
     while cycles < most {
         slower.extend(wave(cycles));

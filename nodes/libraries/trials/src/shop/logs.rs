@@ -18,7 +18,7 @@ const D: [f64; 2] = [5.0, 400.0];
 /// Range of lags, min.
 const LAG_MIN: [f64; 2] = [2.0, 120.0];
 /// Range of growth, µm/K.
-const GROWTH_UM_PER_K: [f64; 2] = [0.02, 20.0];
+const GROWTH_UM_PER_K: [f64; 2] = [0.1, 20.0];
 /// Below this D apart from an alternative both make the same readings.
 const MAX_D_OF_SAME: f64 = 3.0;
 /// Lags of alternatives, min.
@@ -96,7 +96,8 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
     let count = how_many(random);
     let nodes = hidden_nodes(random, times.kind, axis, count);
     let sensors = sensors(random, &course, &nodes, axis);
-    let floor = Floor::draw(random, [0.05, 0.5], [0.01, 0.08]);
+    let memory = random.random_range(0.0..0.8);
+    let floor = Floor::draw(random, [0.05, 0.5], [0.02, 0.15]).with_memory(memory);
     let metric = Metric::of(&floor, &times.courses());
     let zero = vec![1.0; metric.len()];
     let mut hidden = vec![];
@@ -408,8 +409,7 @@ fn effect(
     floor: &Floor,
 ) -> ShopEffect {
     let (times, every) = times.thinned();
-    // Fewer readings of less noise tell as much.
-    let floor = floor.with_white(floor.white_um / (every as f64).sqrt());
+    let floor = floor.thinned(every);
     let metric = Metric::of(&floor, &times.courses());
     let Hidden {
         node,

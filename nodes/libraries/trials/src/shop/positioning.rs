@@ -195,7 +195,9 @@ impl Plan {
             }
         };
         let cycles = match layout {
-            Layout::OneWay | Layout::WanderingTargets => random.random_range(2..=5),
+            Layout::OneWay | Layout::WanderingTargets | Layout::Sorted => {
+                random.random_range(2..=5)
+            }
             _ => random.random_range(1..=5),
         };
         Self {
