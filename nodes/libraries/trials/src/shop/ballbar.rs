@@ -115,16 +115,16 @@ fn circles(tables: &[Mounted]) -> impl Iterator<Item = &Circle> {
 
 fn tables(random: &mut Pcg64Mcg, planes: &[usize]) -> Vec<Mounted> {
     let radius_mm = [50.0, 100.0, 150.0][random.random_range(0..3)];
-    let slow_mm_s = log_uniform(random, [8.0, 35.0]).round();
+    let slow_mm_s = log_uniform(random, [15.0, 40.0]).round();
     let mut feeds = vec![slow_mm_s];
     if random.random() {
         feeds.push(
-            (slow_mm_s * random.random_range(2.0..5.0))
+            (slow_mm_s * random.random_range(1.5..2.5))
                 .round()
                 .min(80.0),
         );
     }
-    let most = if planes.len() * feeds.len() > 3 { 2 } else { 3 };
+    let most = if planes.len() * feeds.len() > 2 { 1 } else { 3 };
     let repeats: usize = random.random_range(1..=most);
     let rows = [180, 240, 360][random.random_range(0..3)];
     let mut tables = vec![];
