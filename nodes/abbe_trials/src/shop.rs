@@ -1,15 +1,15 @@
 //! A trial on a shop's session: its tables are imported by the product, and diagnosed as a process.
 
+use std::collections::BTreeMap;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use std::collections::BTreeMap;
-
 use anyhow::{Context, Result, bail};
 use gap_diagnosis::GapReport;
 use node_runtime::text_file;
+use serde_json::Value;
 use trials::shop::{Answer, ShopEffect, ShopSession, answer};
 use trials::{Truth, Verdict, judge};
 
@@ -145,7 +145,12 @@ fn diagnosed(folder: &Path, names: &[&str]) -> Result<Reported> {
         return Ok(Err(format!("diagnose: {told}")));
     }
     let text = text_file::bytes(&folder.join(REPORT))?;
-    let report = serde_json::from_slice(&text).context("report of abbe diagnose")?;
+    let mut report: Value = serde_json::from_slice(&text).context("report of abbe diagnose")?;
+    // A page's note on the machine file, which is no part of a report.
+    if let Some(keys) = report.as_object_mut() {
+        keys.remove("machine_defaults");
+    }
+    let report = serde_json::from_value(report).context("report of abbe diagnose")?;
     Ok(Ok((
         report,
         String::from_utf8_lossy(&output.stdout).into_owned(),

@@ -16,7 +16,7 @@ use super::shape::Shape;
 
 /// Least part of a wave that slower ones may not imitate.
 const MIN_SHARE_LEFT: f64 = 0.5;
-/// Part of a wave that another one of any frequency may imitate.
+/// Part of a wave that a slower one may imitate.
 const MAX_SHARE_ALIASED: f64 = 0.75;
 /// Periods that targets have to span.
 const MIN_PERIODS: f64 = 2.0;
@@ -146,8 +146,8 @@ pub fn resolves(targets_mm: &[f64], period_mm: f64) -> bool {
     };
     let own = length / period_mm;
     let mut slower = vec![vec![1.0; n], targets_mm.to_vec()];
-    // Waves that differ by less than one over the length are one.
-    let most = (n as f64 / 4.0).min(own - 1.0);
+    // A lead error has no waves of one or two turns.
+    let most = (n as f64 / 4.0).min(0.5 * own);
     let mut cycles = 0.5;
     while cycles < most {
         slower.extend(wave(cycles));
@@ -158,13 +158,11 @@ pub fn resolves(targets_mm: &[f64], period_mm: f64) -> bool {
     }
     let floor = vec![vec![1.0; n]];
     let mut other = 0.25;
-    while other < 2.0 * own + n as f64 {
-        if (other - own).abs() > 1.0 {
-            let [cos, sin] = wave(other);
-            let with = [floor[0].clone(), cos, sin];
-            if share_left(&wave(own), &with) < 1.0 - MAX_SHARE_ALIASED {
-                return false;
-            }
+    while other < own - 1.0 {
+        let [cos, sin] = wave(other);
+        let with = [floor[0].clone(), cos, sin];
+        if share_left(&wave(own), &with) < 1.0 - MAX_SHARE_ALIASED {
+            return false;
         }
         other += 0.25;
     }
