@@ -74,5 +74,6 @@ pub fn verdict(effects: Vec<TrueEffect>, causes: Vec<SaidCause>, is_unknown: boo
         likeness: vec![],
         later_closed: None,
         second: None,
+        shop: None,
     }
 }
