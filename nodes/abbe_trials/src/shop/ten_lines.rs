@@ -12,7 +12,7 @@ pub fn ten_lines(arms: &[ShopTally]) -> Vec<String> {
     let wrong = "a wrong name";
     vec![
         format!(
-            "A named cause may be none: it was wrong in {} of laser runs, {} of ballbars, {} of logs.",
+            "A name was wrong, or alone where only a set was right, in {} of laser runs, {} of ballbars, {} of logs.",
             share(laser, wrong),
             share(ballbar, wrong),
             share(logs, wrong)
@@ -39,8 +39,8 @@ pub fn ten_lines(arms: &[ShopTally]) -> Vec<String> {
         ),
         format!(
             "Runs: one cycle finds {}, three or more {} of what has D above 20.",
-            repeats(laser, &["1"]),
-            repeats(laser, &["3", "4", "5"])
+            by(laser, "repeats", &["1"]),
+            by(laser, "repeats", &["3", "4", "5"])
         ),
         format!(
             "By a ballbar: squareness {}; lost motion {}; reversal spike {}; servo mismatch {}.",
@@ -56,13 +56,18 @@ pub fn ten_lines(arms: &[ShopTally]) -> Vec<String> {
             kinds(logs, "air")
         ),
         format!(
-            "By logs above D 20: lag within 25 % in {}, growth within 10 % in {}.",
+            "By logs above D 20: lag within 25 % in {}, growth within 10 % in {}; a cause is named in {} where readings \
+             scatter on their own, in {} where neighbours share half of their noise.",
             share(logs, "D above 20: lag within 25 %"),
-            share(logs, "D above 20: growth within 10 %")
+            share(logs, "D above 20: growth within 10 %"),
+            by(logs, MEMORY, &["none"]),
+            by(logs, MEMORY, &["0.5 and more"])
         ),
     ]
 }
 
+/// Title of the split by noise.
+const MEMORY: &str = "noise that neighbouring readings share";
 const NOT_TRIED: &str = "not tried";
 
 fn percent(count: Proportion) -> String {
@@ -101,16 +106,19 @@ fn kinds(tally: Option<&ShopTally>, kind: &str) -> String {
     let size = largest.and_then(|split| split.size_of_d_20.as_ref());
     match (sum(own()), size) {
         (count, Some((size, unit))) if count.n > 0 => {
-            format!("found in {} above about {size:.1} {unit}", percent(count))
+            format!(
+                "found in {} above D 20, about {size:.2} {unit}",
+                percent(count)
+            )
         }
         _ => NOT_TRIED.to_owned(),
     }
 }
 
-fn repeats(tally: Option<&ShopTally>, wanted: &[&str]) -> String {
+fn by(tally: Option<&ShopTally>, wanted_title: &str, wanted: &[&str]) -> String {
     let splits = tally.iter().flat_map(|tally| &tally.splits);
     let own = splits
-        .filter(|(title, _)| title == "repeats")
+        .filter(|(title, _)| title == wanted_title)
         .flat_map(|(_, splits)| splits);
     percent(sum(
         own.filter(|split| wanted.contains(&split.what.as_str()))

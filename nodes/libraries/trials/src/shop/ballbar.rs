@@ -97,16 +97,26 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
     ShopSession {
         machine: super::positioning::machine([lead_mm; 3]),
         truth: ShopTruth {
-            session: format!("ballbar at {feeds} feeds in {} planes", planes.len()),
-            layout: format!("{} tables", tables.len()),
+            session: format!(
+                "ballbar, {} and {}",
+                counted(feeds, "feed"),
+                counted(planes.len(), "plane")
+            ),
+            layout: counted(tables.len(), "table"),
             repeats: tables.first().map_or(0, |table| table.circles.len() / 2),
             places: planes.len(),
             effects,
             white_um: floor.white_um,
             between_runs_um: floor.between_runs_um,
+            memory: floor.memory,
         },
         tables: written(&tables, &noise),
     }
+}
+
+fn counted(n: usize, what: &str) -> String {
+    let plural = if n == 1 { "" } else { "s" };
+    format!("{n} {what}{plural}")
 }
 
 fn circles(tables: &[Mounted]) -> impl Iterator<Item = &Circle> {

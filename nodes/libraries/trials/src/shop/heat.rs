@@ -292,8 +292,8 @@ mod tests {
         };
         let course = Course::of(&mut Pcg64Mcg::seed_from_u64(2), &load);
         for node in [Node::Front, Node::Column, Node::Bed, Node::Nut] {
-            let warm = course.at(node);
-            let off = warm.iter().zip(&course.room).map(|(a, b)| (a - b).abs());
+            let own = course.at(node);
+            let off = own.iter().zip(&course.room).map(|(a, b)| (a - b).abs());
             assert!(off.fold(0.0, f64::max) < 3.0, "{node:?}");
         }
     }

@@ -189,6 +189,7 @@ mod tests {
             }],
             white_um: 0.2,
             between_runs_um: 0.1,
+            memory: 0.0,
         }
     }
 

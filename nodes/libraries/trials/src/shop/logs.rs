@@ -96,7 +96,12 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
     let count = how_many(random);
     let nodes = hidden_nodes(random, times.kind, axis, count);
     let sensors = sensors(random, &course, &nodes, axis);
-    let memory = random.random_range(0.0..0.8);
+    let has_memory = random.random::<bool>();
+    let memory = if has_memory {
+        random.random_range(0.2..0.8)
+    } else {
+        0.0
+    };
     let floor = Floor::draw(random, [0.05, 0.5], [0.02, 0.15]).with_memory(memory);
     let metric = Metric::of(&floor, &times.courses());
     let zero = vec![1.0; metric.len()];
@@ -149,6 +154,7 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
             effects,
             white_um: floor.white_um,
             between_runs_um: floor.between_runs_um,
+            memory: floor.memory,
         },
     }
 }

@@ -14,6 +14,8 @@ use crate::verdict::Verdict;
 pub const MIN_D_TO_FIND: f64 = 20.0;
 /// Edge between the two lower bins.
 const MIDDLE_D: f64 = 10.0;
+/// Edge between little and much noise that neighbouring readings share.
+const MUCH_MEMORY: f64 = 0.5;
 /// Errors of lag and growth that are allowed.
 const MAX_LAG_ERROR: f64 = 0.25;
 const MAX_GROWTH_ERROR: f64 = 0.10;
@@ -327,6 +329,16 @@ fn splits(answered: &[Judged<'_>]) -> Vec<(String, Vec<Split>)> {
     };
     let mut all: Vec<(String, Vec<Split>)> =
         keys.iter().map(|(title, key)| of(title, key)).collect();
+    all.push(of("noise that neighbouring readings share", &|truth| {
+        let words = if truth.memory >= MUCH_MEMORY {
+            "0.5 and more"
+        } else if truth.memory > 0.0 {
+            "below 0.5"
+        } else {
+            "none"
+        };
+        words.to_owned()
+    }));
     all.push(of("targets, planes or thermometers", &|truth| {
         few(truth.places).to_owned()
     }));

@@ -28,6 +28,8 @@ pub struct ShopTruth {
     pub white_um: f64,
     /// Smooth deviation of runs from each other, µm.
     pub between_runs_um: f64,
+    /// What a reading keeps of the noise of the one before.
+    pub memory: f64,
 }
 
 /// One hidden effect.
