@@ -60,8 +60,8 @@ impl Line {
         };
         let holds = (self.interval[0]..=self.interval[1]).contains(&target);
         match (is_met, holds) {
-            (true, _) => "met",
-            (false, true) => "open",
+            (_, true) => "open",
+            (true, false) => "met",
             (false, false) => "missed",
         }
     }
