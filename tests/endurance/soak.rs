@@ -97,9 +97,10 @@ fn watched(scenario: &Scenario, hours: f64) -> Vec<Sample> {
     samples
 }
 
+/// Memory of its own: pages of the program's file come as its code is reached, and go as the computer likes.
 fn held_mib(process: u32) -> Option<f64> {
     let text = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
-    let line = text.lines().find(|line| line.starts_with("VmRSS:"))?;
+    let line = text.lines().find(|line| line.starts_with("RssAnon:"))?;
     let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
     Some(kib / 1024.0)
 }
