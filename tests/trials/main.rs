@@ -10,4 +10,3 @@ mod blind;
 mod floor;
 mod page;
 mod series;
-mod shop;

@@ -192,7 +192,6 @@ impl Programmes {
                 likeness: vec![],
                 later_closed: None,
                 second: None,
-                shop: None,
             },
         })
     }
