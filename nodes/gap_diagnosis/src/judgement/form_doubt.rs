@@ -32,6 +32,7 @@ use crate::noise::stack::Stack;
 use crate::search::refit::{self, Estimate};
 use crate::search::rows::count;
 use crate::search::signature::{Form, Library};
+use crate::search::widening;
 
 /// Coverage factor of the intervals.
 const COVERAGE: f64 = 1.96;
@@ -147,6 +148,7 @@ fn wider(stack: &Stack<'_>, signatures: &Library, form: &Form, estimate: &Estima
     let amplitudes = parameters()
         .filter(|(place, p)| {
             p.role == Role::Amplitude
+                && widening::is_free_here(stack, instance, p.name)
                 && (form.amplitudes.contains(place) || shows(place, p.typical))
         })
         .map(|(place, _)| place)

@@ -240,8 +240,8 @@ impl Searched<'_> {
     }
 }
 
-/// Effects that are a number at each target and side.
-const OF_TARGETS: [&str; 3] = ["backlash", "pitch_error", "scale_error"];
+/// Effects that are a number at each target and side. A straight line is not: its form is the catalogue's, and other lines have theirs.
+const OF_TARGETS: [&str; 2] = ["backlash", "pitch_error"];
 
 /// What the rows would show of some members, mm.
 pub(crate) fn told<'m>(

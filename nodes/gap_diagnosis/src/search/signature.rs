@@ -25,7 +25,7 @@ use twin::{Response, Run};
 
 use crate::noise::normal::Normal;
 use crate::noise::stack::Stack;
-use crate::search::resolved;
+use crate::search::{resolved, widening};
 
 /// One effect on one target.
 #[derive(Clone, Debug)]
@@ -218,12 +218,13 @@ impl Library {
         let mut columns = vec![];
         let mut greatest = 0.0_f64;
         for (place, parameter) in parameters().take(shown) {
-            if parameter.role != Role::Amplitude {
+            let own = &self.instances[instance];
+            let is_free = || widening::is_free_here(stack, own, parameter.name);
+            if parameter.role != Role::Amplitude || !is_free() {
                 continue;
             }
             let mut on = values.clone();
             on[place] = parameter.typical;
-            let own = &self.instances[instance];
             let column = stack.signature_of(&own.name(), &on, &*own.effect(&on));
             let most = parameter.low.abs().max(parameter.high.abs()) / parameter.typical;
             let size = column.norm();

@@ -111,6 +111,19 @@ pub fn axis_at_targets(stack: &Stack<'_>, instance: &Instance) -> Option<Axis> {
     resolved::is_at_targets(stack, axis).then_some(axis)
 }
 
+/// Free amplitudes that only targets along the whole curve tell apart: circles and paths are over a part of it.
+const AT_TARGETS_ALONE: [&str; 4] = [
+    "free_by_place3_um",
+    "free_by_place4_um",
+    "free_by_place5_um",
+    "free_by_place6_um",
+];
+
+/// Whether a free amplitude of an instance may be in its wide form.
+pub fn is_free_here(stack: &Stack<'_>, instance: &Instance, name: &str) -> bool {
+    !AT_TARGETS_ALONE.contains(&name) || axis_at_targets(stack, instance).is_some()
+}
+
 /// Adds the curve of any form to the pitch error of every axis that was read at targets only. Its plain curve may be
 /// absent from the error that the targets show alike upwards and downwards.
 pub fn widen_curves(stack: &Stack<'_>, signatures: &mut Library) {
