@@ -21,6 +21,7 @@ use std::collections::BTreeMap;
 
 use metrology::Axis;
 use nalgebra::{DMatrix, DVector};
+use twin::Channel;
 use twin::effects::{Parameter, Target};
 
 use crate::noise::normal::Normal;
@@ -97,7 +98,34 @@ pub fn set_aside(
             );
         }
     }
+    aside.extend(wavelengths(stack, signatures));
     aside
+}
+
+/// The error of a laser's wavelength, which is a scale of the axis where it reads one alone, whatever the noise: the instances of
+/// it, with those of that scale.
+fn wavelengths(stack: &Stack<'_>, signatures: &Library) -> BTreeMap<usize, Vec<usize>> {
+    let mut channels = stack.rows.blocks.iter().map(|block| &block.channel);
+    let Some(Channel::Length(axis)) = channels.next() else {
+        return BTreeMap::new();
+    };
+    if channels.any(|channel| *channel != Channel::Length(*axis)) {
+        return BTreeMap::new();
+    }
+    let of = |id: &'static str| {
+        let all = signatures.instances.iter().enumerate();
+        all.filter(move |(_, instance)| instance.kind.id == id)
+    };
+    let scales: Vec<usize> = of("scale_error")
+        .filter(|(_, instance)| matches!(instance.target, Target::Axis(own) if own == *axis))
+        .map(|(place, _)| place)
+        .collect();
+    if scales.is_empty() {
+        return BTreeMap::new();
+    }
+    of("length_wavelength")
+        .map(|(place, _)| (place, scales.clone()))
+        .collect()
 }
 
 fn is_direct(signatures: &Library, form: usize) -> bool {

@@ -8,7 +8,7 @@ use machine::file::MachineFile;
 use metrology::sample::{Sense, TestKind, TestPlane, TestSegment};
 use metrology::{PerAxis, Stamp};
 use nalgebra::Vector3;
-use twin::effects::{CATALOGUE, Role};
+use twin::effects::CATALOGUE;
 use twin::{Channel, History, Motion, Reading, Run, Session, Touch, Twin};
 
 const MACHINE: &str = include_str!("../../machine/tests/data/bench.yaml");
