@@ -54,33 +54,13 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
     let tables = tables(random, &planes);
     let memory = random.random_range(0.5..0.95);
     let floor = Floor::draw(random, [0.1, 0.6], [0.05, 0.4]).with_memory(memory);
-    let courses: Vec<Vec<f64>> = circles(&tables)
-        .map(|circle| {
-            circle
-                .angles
-                .iter()
-                .map(|angle| angle.rem_euclid(TAU) / TAU)
-                .collect()
-        })
-        .collect();
+    let courses = courses(&tables);
     let metric = Metric::of(&floor, &courses);
     let set_up = set_up(&tables, metric.len());
     let count = how_many(random);
-    let mut hidden: Vec<Hidden> = vec![];
-    for motion in motions(random, &tables, lead_mm, count) {
-        let one: Vec<f64> = circles(&tables)
-            .flat_map(|circle| motion.radial_um(circle))
-            .collect();
-        let d_of_one = metric.d(&one, &set_up);
-        let ([low, high], _) = motion.sizes();
-        let size = (log_uniform(random, D) / d_of_one.max(1e-9)).clamp(low, high);
-        let size = if motion.has_both_signs() {
-            sign(random) * size
-        } else {
-            size
-        };
-        hidden.push(Hidden { motion, size, one });
-    }
+    let wanted = motions(random, &tables, lead_mm, count);
+    let of = |motion| hide(random, motion, &tables, &metric, &set_up);
+    let hidden: Vec<Hidden> = wanted.into_iter().map(of).collect();
     let effects = (0..hidden.len()).map(|own| effect(&tables, &metric, &set_up, &hidden, own));
     let effects = effects.collect();
     let mut noise = courses
@@ -114,6 +94,36 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
     }
 }
 
+/// The course of every circle's readings.
+fn courses(tables: &[Mounted]) -> Vec<Vec<f64>> {
+    let turned = |angle: &f64| angle.rem_euclid(TAU) / TAU;
+    circles(tables)
+        .map(|circle| circle.angles.iter().map(turned).collect())
+        .collect()
+}
+
+/// An effect at a size whose D is drawn.
+fn hide(
+    random: &mut Pcg64Mcg,
+    motion: Motion,
+    tables: &[Mounted],
+    metric: &Metric,
+    set_up: &[Vec<f64>],
+) -> Hidden {
+    let one: Vec<f64> = circles(tables)
+        .flat_map(|circle| motion.radial_um(circle))
+        .collect();
+    let d_of_one = metric.d(&one, set_up);
+    let ([low, high], _) = motion.sizes();
+    let size = (log_uniform(random, D) / d_of_one.max(1e-9)).clamp(low, high);
+    let size = if motion.has_both_signs() {
+        sign(random) * size
+    } else {
+        size
+    };
+    Hidden { motion, size, one }
+}
+
 fn counted(n: usize, what: &str) -> String {
     let plural = if n == 1 { "" } else { "s" };
     format!("{n} {what}{plural}")
@@ -141,7 +151,7 @@ fn tables(random: &mut Pcg64Mcg, planes: &[usize]) -> Vec<Mounted> {
     for plane in planes {
         for feed_mm_s in &feeds {
             let circle = |k: usize| {
-                let is_ccw = k % 2 == 0;
+                let is_ccw = k.is_multiple_of(2);
                 let turned = |row: usize| {
                     let row = if is_ccw { row } else { rows - row };
                     TAU * row as f64 / rows as f64
@@ -224,7 +234,7 @@ impl Motion {
                 name("squareness", plane.map_or("", |(.., pair)| pair))
             }
             Self::Scale(axis) => name("scale_error", LETTERS[*axis]),
-            Self::LostMotion(axis, ..) => name("backlash", LETTERS[*axis]),
+            Self::Backlash(axis, ..) => name("backlash", LETTERS[*axis]),
             Self::Reversal(axis, _) => name("reversal_spike", LETTERS[*axis]),
             Self::Slow(axis) => name("servo_lag", LETTERS[*axis]),
             Self::Cyclic(axis, _) => name("cyclic_error", LETTERS[*axis]),
@@ -235,7 +245,7 @@ impl Motion {
         match self {
             Self::Squareness(_) => "squareness",
             Self::Scale(_) => "scale of an axis",
-            Self::LostMotion(..) => "lost motion",
+            Self::Backlash(..) => "lost motion",
             Self::Reversal(..) => "reversal spike",
             Self::Slow(_) => "servo mismatch",
             Self::Cyclic(..) => "cyclic error",
@@ -246,7 +256,7 @@ impl Motion {
         match self {
             Self::Squareness(_) => ([2.0, 300.0], "µrad"),
             Self::Scale(_) => ([2.0, 300.0], "µm/m"),
-            Self::LostMotion(..) => ([0.3, 40.0], "µm"),
+            Self::Backlash(..) => ([0.3, 40.0], "µm"),
             Self::Reversal(..) => ([0.5, 60.0], "µm"),
             Self::Slow(_) => ([0.01, 3.0], "ms"),
             Self::Cyclic(..) => ([0.1, 10.0], "µm"),

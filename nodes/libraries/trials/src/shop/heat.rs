@@ -144,7 +144,7 @@ fn room(random: &mut Pcg64Mcg, steps: usize) -> Vec<f64> {
     let mut wander = 0.0;
     let of = |step: usize| {
         let at_s = step as f64 * STEP_S;
-        if step % 60 == 0 {
+        if step.is_multiple_of(60) {
             wander = 0.998 * wander + 0.02 * normal(random);
         }
         let cycle = (at_s / swing_s).fract();

@@ -156,11 +156,10 @@ pub fn resolves(targets_mm: &[f64], period_mm: f64) -> bool {
     if slower.len() + 4 > n || share_left(&wave(own), &slower) < MIN_SHARE_LEFT {
         return false;
     }
-    let floor = vec![vec![1.0; n]];
     let mut other = 0.25;
     while other < own - 1.0 {
         let [cos, sin] = wave(other);
-        let with = [floor[0].clone(), cos, sin];
+        let with = [vec![1.0; n], cos, sin];
         if share_left(&wave(own), &with) < 1.0 - MAX_SHARE_ALIASED {
             return false;
         }

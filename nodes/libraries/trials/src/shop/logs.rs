@@ -96,49 +96,19 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
     let count = how_many(random);
     let nodes = hidden_nodes(random, times.kind, axis, count);
     let sensors = sensors(random, &course, &nodes, axis);
-    let has_memory = random.random::<bool>();
-    let memory = if has_memory {
-        random.random_range(0.2..0.8)
-    } else {
-        0.0
-    };
-    let floor = Floor::draw(random, [0.05, 0.5], [0.02, 0.15]).with_memory(memory);
+    let floor = draw_floor(random);
     let metric = Metric::of(&floor, &times.courses());
-    let zero = vec![1.0; metric.len()];
-    let mut hidden = vec![];
-    for node in nodes {
-        let face = course.at(node);
-        let lag_s = 60.0 * log_uniform(random, LAG_MIN);
-        let behind = Behind::draw(random, lag_s);
-        let first = face[0];
-        let one: Vec<f64> = behind
-            .mean(&face)
-            .iter()
-            .map(|value| value - first)
-            .collect();
-        let d_of_one = metric.d(&times.pick(&one), std::slice::from_ref(&zero));
-        let [low, high] = GROWTH_UM_PER_K;
-        let size = (log_uniform(random, D) / d_of_one.max(1e-9)).clamp(low, high);
-        hidden.push(Hidden {
-            node,
-            um_per_k: sign(random) * size,
-            one,
-        });
-    }
+    let of = |node| hide(random, node, &course, &times, &metric);
+    let hidden: Vec<Hidden> = nodes.into_iter().map(of).collect();
     let text = table(random, &times, &sensors, &hidden, &floor);
     let effects = { 0..hidden.len() }
         .map(|own| effect(&times, &sensors, &hidden, own, axis, &floor))
         .collect();
-    let cause = if times.kind == Kind::Day {
-        ", cause: environment"
-    } else {
-        ""
-    };
     ShopSession {
         tables: vec![Table {
             name: "log".to_owned(),
             text,
-            map: map(&times, &sensors, axis, cause),
+            map: map(&times, &sensors, axis),
         }],
         machine: machine(&sensors),
         truth: ShopTruth {
@@ -156,6 +126,40 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
             between_runs_um: floor.between_runs_um,
             memory: floor.memory,
         },
+    }
+}
+
+/// Noise of a log: in half of them neighbouring readings share a part of it.
+fn draw_floor(random: &mut Pcg64Mcg) -> Floor {
+    let has_memory = random.random::<bool>();
+    let memory = if has_memory {
+        random.random_range(0.2..0.8)
+    } else {
+        0.0
+    };
+    Floor::draw(random, [0.05, 0.5], [0.02, 0.15]).with_memory(memory)
+}
+
+/// Growth by a node, lagged by a drawn time, at a size whose D is drawn.
+fn hide(
+    random: &mut Pcg64Mcg,
+    node: Node,
+    course: &Course,
+    times: &Times,
+    metric: &Metric,
+) -> Hidden {
+    let face = course.at(node);
+    let lag_s = 60.0 * log_uniform(random, LAG_MIN);
+    let behind = Behind::draw(random, lag_s);
+    let mean = behind.mean(&face);
+    let one: Vec<f64> = mean.iter().map(|value| value - face[0]).collect();
+    let d_of_one = metric.d(&times.pick(&one), &[vec![1.0; metric.len()]]);
+    let [low, high] = GROWTH_UM_PER_K;
+    let size = (log_uniform(random, D) / d_of_one.max(1e-9)).clamp(low, high);
+    Hidden {
+        node,
+        um_per_k: sign(random) * size,
+        one,
     }
 }
 
@@ -372,7 +376,11 @@ fn table(
     text
 }
 
-fn map(times: &Times, sensors: &[Sensor], axis: &str, cause: &str) -> String {
+fn map(times: &Times, sensors: &[Sensor], axis: &str) -> String {
+    let cause = match times.kind {
+        Kind::Day => ", cause: environment",
+        _ => "",
+    };
     let columns: Vec<String> = { sensors.iter() }
         .map(|sensor| format!("{0}: {0}", sensor.id))
         .collect();

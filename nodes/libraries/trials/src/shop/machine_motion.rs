@@ -38,7 +38,7 @@ pub enum Motion {
     /// An axis is longer than it should be.
     Scale(usize),
     /// Lost motion: ways of the elements, mm, and their shares.
-    LostMotion(usize, [f64; ELEMENTS], [f64; ELEMENTS]),
+    Backlash(usize, [f64; ELEMENTS], [f64; ELEMENTS]),
     /// Reversal: frequency of the loop, 1/s, its damping, and the time of its integrator, s.
     Reversal(usize, [f64; 3]),
     /// A loop that is slower than the others'.
@@ -54,7 +54,7 @@ impl Motion {
         let ways = [0, 1, 2, 3, 4].map(|k| longest_mm * 0.5_f64.powi(k));
         let drawn: [f64; ELEMENTS] = [(); ELEMENTS].map(|()| random.random_range(0.1..1.0));
         let whole: f64 = drawn.iter().sum();
-        Self::LostMotion(axis, ways, drawn.map(|share| share / whole))
+        Self::Backlash(axis, ways, drawn.map(|share| share / whole))
     }
 
     /// Reversal of an axis.
@@ -94,7 +94,7 @@ impl Motion {
                 let place_mm = radius_mm * along(*axis, angle);
                 (TAU * place_mm / period_mm + phase).sin() * along(*axis, angle)
             }),
-            Self::LostMotion(axis, ways, shares) => {
+            Self::Backlash(axis, ways, shares) => {
                 let mut held = [0.0; ELEMENTS];
                 circle.followed(|before, now| {
                     let moved = radius_mm * (along(*axis, now) - along(*axis, before));

@@ -76,26 +76,11 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
     let mut deviations = plan.noise(random, &floor, &stops, &courses);
     let mut hidden = vec![];
     for kind in kinds {
-        let period_mm = plan.period_mm(random, kind);
-        let one = readings(random, kind, &stops, period_mm);
-        let d_of_one = metric.d(&in_runs(&stops, &one), &[vec![1.0; stops.len()]]);
-        let ([low, high], _) = kind.sizes();
-        let size = (log_uniform(random, D) / d_of_one.max(1e-9)).clamp(low, high);
-        let size = size
-            * if kind == Kind::Cyclic {
-                1.0
-            } else {
-                sign(random)
-            };
-        for (sum, value) in deviations.iter_mut().zip(&one) {
-            *sum += size * value;
+        let own = plan.hide(random, kind, &metric, &stops);
+        for (sum, value) in deviations.iter_mut().zip(&own.one) {
+            *sum += own.size * value;
         }
-        hidden.push(Hidden {
-            kind,
-            size,
-            one,
-            period_mm,
-        });
+        hidden.push(own);
     }
     let effects = plan.effects(&metric, &stops, &hidden);
     let run = Run {
@@ -220,6 +205,22 @@ impl Plan {
             random.random_range(0.5..1.6)
         };
         self.lead_mm * factor
+    }
+
+    /// An effect at a size whose D is drawn.
+    fn hide(&self, random: &mut Pcg64Mcg, kind: Kind, metric: &Metric, stops: &[Stop]) -> Hidden {
+        let period_mm = self.period_mm(random, kind);
+        let one = readings(random, kind, stops, period_mm);
+        let d_of_one = metric.d(&in_runs(stops, &one), &[vec![1.0; stops.len()]]);
+        let ([low, high], _) = kind.sizes();
+        let size = (log_uniform(random, D) / d_of_one.max(1e-9)).clamp(low, high);
+        let is_signed = kind != Kind::Cyclic;
+        Hidden {
+            kind,
+            size: if is_signed { size * sign(random) } else { size },
+            one,
+            period_mm,
+        }
     }
 
     /// The stops in the order of the measurement.

@@ -36,8 +36,7 @@ pub struct Line {
 }
 
 impl Line {
-    fn of(what: &str, all: impl Iterator<Item = bool>, target: Option<f64>, is_high: bool) -> Self {
-        let count = Proportion::of(all);
+    fn of(what: &str, count: Proportion, target: Option<f64>, is_high: bool) -> Self {
         Self {
             what: what.to_owned(),
             count,
@@ -158,104 +157,100 @@ fn effects<'v>(answered: &[Judged<'v>]) -> Vec<(&'v Verdict, &'v ShopEffect)> {
     answered.iter().flat_map(of).collect()
 }
 
+/// An effect with the verdict on its session.
+type Effect<'v> = (&'v Verdict, &'v ShopEffect);
+
 /// The figures of the protocol.
 fn lines(arm: Arm, all: &[Judged<'_>], answered: &[Judged<'_>]) -> Vec<Line> {
-    let nothing = || {
-        answered
-            .iter()
-            .filter(|(_, truth)| truth.effects.is_empty())
+    let answers = Proportion::of(all.iter().map(|(verdict, _)| verdict.said.is_some()));
+    let mut lines = vec![Line::of("answered", answers, None, true)];
+    lines.extend(of_names(answered));
+    let large = effects(answered);
+    let large: Vec<Effect<'_>> = { large.into_iter() }
+        .filter(|(_, effect)| effect.d > MIN_D_TO_FIND)
+        .collect();
+    lines.extend(of_effects(&large));
+    if arm == Arm::ShopLogs {
+        lines.extend(of_temperatures(&large));
+    }
+    lines
+}
+
+/// What was named in whole sessions.
+fn of_names(answered: &[Judged<'_>]) -> [Line; 5] {
+    let nothing = |holds: fn(&Verdict) -> bool| {
+        let own = { answered.iter() }.filter(|(_, truth)| truth.effects.is_empty());
+        Proportion::of(own.map(|(verdict, _)| holds(verdict)))
     };
-    let is_named = |(verdict, _): &Judged<'_>| verdict.named().next().is_some();
-    let only_too_sure = |(verdict, _): &Judged<'_>| {
+    let each = |holds: fn(&Verdict) -> bool| {
+        Proportion::of(answered.iter().map(|(verdict, _)| holds(verdict)))
+    };
+    let only_too_sure = each(|verdict| {
         let wrong = wrong_names(verdict);
         !wrong.is_empty() && wrong.iter().all(|(_, call)| *call == Call::TooSure)
-    };
-    let large = effects(answered);
-    let large = || large.iter().filter(|(_, effect)| effect.d > MIN_D_TO_FIND);
-    let told = || large().filter(|(_, effect)| effect.is_resolvable());
-    let open = || large().filter(|(_, e)| !e.is_resolvable() && !e.names.is_empty());
-    let found = |(verdict, effect): &(&Verdict, &ShopEffect)| is_found(verdict, effect);
-    let mut lines = vec![
-        Line::of(
-            "answered",
-            all.iter().map(|(v, _)| v.said.is_some()),
-            None,
-            true,
-        ),
-        Line::of(
-            "nothing hidden: a cause named",
-            nothing().map(is_named),
-            Some(0.005),
-            false,
-        ),
+    });
+    let named = nothing(|verdict| verdict.named().next().is_some());
+    let unflagged = each(|verdict| has_wrong(verdict) && !verdict.is_flagged());
+    let too_sure = "of these: a single true name where the set was right";
+    [
+        Line::of("nothing hidden: a cause named", named, Some(0.005), false),
         Line::of(
             "nothing hidden: any alarm",
-            nothing().map(|(v, _)| has_alarm(v)),
+            nothing(has_alarm),
             Some(0.02),
             false,
         ),
-        Line::of(
-            "a wrong name",
-            answered.iter().map(|(v, _)| has_wrong(v)),
-            Some(0.02),
-            false,
-        ),
-        Line::of(
-            "of these: a single true name where the set was right",
-            answered.iter().map(only_too_sure),
-            None,
-            false,
-        ),
+        Line::of("a wrong name", each(has_wrong), Some(0.02), false),
+        Line::of(too_sure, only_too_sure, None, false),
         Line::of(
             "a wrong name, and unknown not flagged",
-            answered
-                .iter()
-                .map(|(v, _)| has_wrong(v) && !v.is_flagged()),
+            unflagged,
             Some(0.01),
             false,
         ),
-        Line::of(
-            "D above 20, resolvable: named",
-            told().map(found),
-            Some(0.90),
-            true,
-        ),
+    ]
+}
+
+/// How many of the large effects were found.
+fn of_effects(large: &[Effect<'_>]) -> [Line; 2] {
+    let found = |fits: fn(&ShopEffect) -> bool| {
+        let own = large.iter().filter(|(_, effect)| fits(effect));
+        Proportion::of(own.map(|(verdict, effect)| is_found(verdict, effect)))
+    };
+    let named = found(ShopEffect::is_resolvable);
+    let in_set = found(|effect| !effect.is_resolvable() && !effect.names.is_empty());
+    [
+        Line::of("D above 20, resolvable: named", named, Some(0.90), true),
         Line::of(
             "D above 20, not resolvable: in the set",
-            open().map(found),
+            in_set,
             Some(0.97),
             true,
         ),
-    ];
-    if arm == Arm::ShopLogs {
-        let apart = || large().filter(|(_, effect)| effect.same_readings.is_empty());
-        let within = |k: usize, most: f64| {
-            apart().map(move |(verdict, effect)| {
-                followed(verdict, effect).is_some_and(|errors| errors[k].abs() <= most)
-            })
-        };
-        lines.push(Line::of(
-            "D above 20: lag within 25 %",
-            within(0, MAX_LAG_ERROR),
-            Some(0.90),
-            true,
-        ));
-        let growth = within(1, MAX_GROWTH_ERROR);
-        lines.push(Line::of(
-            "D above 20: growth within 10 %",
-            growth,
-            Some(0.90),
-            true,
-        ));
-        let seen = apart().map(|(verdict, effect)| followed(verdict, effect).is_some());
-        lines.push(Line::of(
+    ]
+}
+
+/// Lag and growth of the large effects that nothing imitates.
+fn of_temperatures(large: &[Effect<'_>]) -> [Line; 3] {
+    let holds = |holds: &dyn Fn([f64; 2]) -> bool| {
+        let own = large
+            .iter()
+            .filter(|(_, effect)| effect.same_readings.is_empty());
+        Proportion::of(own.map(|(verdict, effect)| followed(verdict, effect).is_some_and(holds)))
+    };
+    let lag = holds(&|[lag, _]| lag.abs() <= MAX_LAG_ERROR);
+    let growth = holds(&|[_, growth]| growth.abs() <= MAX_GROWTH_ERROR);
+    let seen = holds(&|_| true);
+    [
+        Line::of("D above 20: lag within 25 %", lag, Some(0.90), true),
+        Line::of("D above 20: growth within 10 %", growth, Some(0.90), true),
+        Line::of(
             "D above 20: the right thermometer reported",
             seen,
             None,
             true,
-        ));
-    }
-    lines
+        ),
+    ]
 }
 
 fn bins(all: &[(&Verdict, &ShopEffect)]) -> [Proportion; 3] {
