@@ -18,11 +18,11 @@ pub struct Bar {
     pub is_beyond: bool,
 }
 
-const WIDTH: f64 = 560.0;
+const BARS_WIDTH: f64 = 560.0;
 /// Height of a bar with its name, px.
-const ROW_PX: f64 = 46.0;
+const BAR_ROW_PX: f64 = 46.0;
 /// Left and right end of the bars, px.
-const BARS_PX: [f64; 2] = [6.0, 536.0];
+const BAR_LENGTH_PX: [f64; 2] = [6.0, 536.0];
 
 /// Draws bars from zero; `axis`: what their length is, with its unit.
 #[must_use]
@@ -34,18 +34,18 @@ pub fn svg(axis: &str, bars: &[Bar]) -> String {
 }
 
 fn draw(text: &mut String, axis: &str, bars: &[Bar]) -> std::fmt::Result {
-    let bottom = ROW_PX * bars.len() as f64 + 4.0;
+    let bottom = BAR_ROW_PX * bars.len() as f64 + 4.0;
     let height = bottom + 30.0;
     let sizes = bars.iter().map(|bar| bar.size);
     let scale = Scale {
         low: 0.0,
         high: sizes.filter(|size| size.is_finite()).fold(1e-9, f64::max),
-        low_px: BARS_PX[0],
-        high_px: BARS_PX[1],
+        low_px: BAR_LENGTH_PX[0],
+        high_px: BAR_LENGTH_PX[1],
     };
     write!(
         text,
-        "<svg class=\"plot bars\" role=\"img\" aria-label=\"{}\" viewBox=\"0 0 {WIDTH} {height}\">",
+        "<svg class=\"plot bars\" role=\"img\" aria-label=\"{}\" viewBox=\"0 0 {BARS_WIDTH} {height}\">",
         escaped(axis)
     )?;
     for (value, label) in scale.ticks() {
@@ -57,16 +57,16 @@ fn draw(text: &mut String, axis: &str, bars: &[Bar]) -> std::fmt::Result {
         )?;
     }
     for (row, bar) in bars.iter().enumerate() {
-        let top = ROW_PX * row as f64;
+        let top = BAR_ROW_PX * row as f64;
         let opacity = if bar.is_beyond { 1.0 } else { 0.35 };
-        let width = (scale.px(bar.size) - BARS_PX[0]).max(1.5);
+        let width = (scale.px(bar.size) - BAR_LENGTH_PX[0]).max(1.5);
         write!(
             text,
             "<text class=\"ring\" x=\"{}\" y=\"{:.1}\">{}</text><g class=\"c0\"><rect x=\"{}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"14\" fill=\"currentColor\" fill-opacity=\"{opacity}\"/></g>",
-            BARS_PX[0],
+            BAR_LENGTH_PX[0],
             top + 20.0,
             escaped(&bar.name),
-            BARS_PX[0],
+            BAR_LENGTH_PX[0],
             top + 26.0
         )?;
     }

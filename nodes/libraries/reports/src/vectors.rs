@@ -30,9 +30,9 @@ pub struct Field {
 
 /// Boxes along each axis, of which each has one arrow at most.
 const BOXES: [f64; 3] = [6.0, 5.0, 4.0];
-const WIDTH: f64 = 360.0;
+const VECTORS_WIDTH: f64 = 360.0;
 /// Left, right and top end of the drawing, px; its height follows from the volume.
-const FRAME: [f64; 3] = [58.0, 340.0, 12.0];
+const VECTOR_FRAME: [f64; 3] = [58.0, 340.0, 12.0];
 /// Least and greatest height of the drawing, px.
 const HEIGHTS_PX: [f64; 2] = [120.0, 300.0];
 /// Longest arrow as a share of the greatest side of the volume.
@@ -121,7 +121,7 @@ fn panel(
     m: f64,
 ) -> String {
     let [u, v] = plane.map(Axis::index);
-    let [left, right, top] = FRAME;
+    let [left, right, top] = VECTOR_FRAME;
     // Millimetres are as long upwards as to the right, as far as the height allows.
     let wanted = (right - left) * (high[v] - low[v]) / (high[u] - low[u]);
     let bottom = top + wanted.clamp(HEIGHTS_PX[0], HEIGHTS_PX[1]);
@@ -134,7 +134,7 @@ fn panel(
     };
     let scales = (scale(u, [left, right]), scale(v, [bottom, top]));
     let mut text = format!(
-        "<svg class=\"plot\" role=\"img\" aria-label=\"error vectors in {}{}\" viewBox=\"0 0 {WIDTH} {}\">",
+        "<svg class=\"plot\" role=\"img\" aria-label=\"error vectors in {}{}\" viewBox=\"0 0 {VECTORS_WIDTH} {}\">",
         plane[0],
         plane[1],
         bottom + 54.0

@@ -18,7 +18,7 @@ const COVERAGE: f64 = 2.0;
 const BY_CHANCE: f64 = 0.01;
 /// Most causes of the answer, and of the drawing.
 const MOST_IN_ANSWER: usize = 3;
-const MOST_BARS: usize = 8;
+const MOST_CAUSES_DRAWN: usize = 8;
 /// What a scatter lacks.
 pub const SCATTER_ALONE: &str = "What the instruments themselves are off by is not in them.";
 
@@ -206,7 +206,7 @@ fn drawing(plane: &PlaneBreakdown) -> Option<Drawing> {
         size: row.peak_to_peak_mm * 1e3,
         is_beyond: is_beyond(row),
     };
-    let bars: Vec<Bar> = rows.iter().take(MOST_BARS).map(bar).collect();
+    let bars: Vec<Bar> = rows.iter().take(MOST_CAUSES_DRAWN).map(bar).collect();
     (!bars.is_empty()).then(|| Drawing {
         svg: bars::svg("span that each cause makes alone / µm", &bars),
         caption: "Largest causes with U (k = 2). Faint: not beyond chance or U.".to_owned(),

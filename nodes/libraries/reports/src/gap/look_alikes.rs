@@ -19,18 +19,18 @@ const ALIKE: f64 = 0.7;
 /// Cosine from which this recording hardly separates them.
 const SAME: f64 = 0.95;
 /// Most names of the graph; the others are in the table.
-const MOST_DRAWN: usize = 40;
+const MOST_ARCS: usize = 40;
 /// Most names in one cell, and most pairs in the sentence.
 const MOST_NAMES: usize = 3;
-const WIDTH: f64 = 720.0;
+const ARCS_WIDTH: f64 = 720.0;
 /// Height of a line, px.
 const LINE_PX: f64 = 30.0;
 /// Where the names end and the arcs begin, px.
 const ARCS_PX: f64 = 400.0;
 /// Room for the farthest arc, px.
-const REACH_PX: f64 = 300.0;
+const ARC_REACH_PX: f64 = 300.0;
 /// Most letters of a name in the graph.
-const MOST_LETTERS: usize = 40;
+const MOST_LETTERS_OF_A_NAME: usize = 40;
 
 /// Size of the cosine between two effects.
 fn cosine(isolability: &Isolability, a: usize, b: usize) -> f64 {
@@ -70,10 +70,10 @@ fn chained(isolability: &Isolability) -> Vec<usize> {
 }
 
 fn shortened(name: &str) -> String {
-    if name.chars().count() <= MOST_LETTERS {
+    if name.chars().count() <= MOST_LETTERS_OF_A_NAME {
         return name.to_owned();
     }
-    let begin: String = name.chars().take(MOST_LETTERS).collect();
+    let begin: String = name.chars().take(MOST_LETTERS_OF_A_NAME).collect();
     format!("{begin}…")
 }
 
@@ -83,7 +83,7 @@ fn drawing(isolability: &Isolability) -> Option<Drawing> {
     if chain.is_empty() {
         return None;
     }
-    let shown: Vec<usize> = chain.iter().copied().take(MOST_DRAWN).collect();
+    let shown: Vec<usize> = chain.iter().copied().take(MOST_ARCS).collect();
     let named = [
         (
             1,
@@ -111,7 +111,7 @@ fn draw(text: &mut String, isolability: &Isolability, shown: &[usize]) -> std::f
     let height = LINE_PX * shown.len() as f64 + 8.0;
     write!(
         text,
-        "<svg class=\"plot look_alikes\" role=\"img\" aria-label=\"effects that look alike\" viewBox=\"0 0 {WIDTH} {height}\">"
+        "<svg class=\"plot look_alikes\" role=\"img\" aria-label=\"effects that look alike\" viewBox=\"0 0 {ARCS_WIDTH} {height}\">"
     )?;
     let y = |line: usize| LINE_PX * (line as f64 + 0.6);
     let name = |line: usize| name_of(&isolability.names[shown[line]]);
@@ -124,7 +124,7 @@ fn draw(text: &mut String, isolability: &Isolability, shown: &[usize]) -> std::f
             }
             let (colour, width) = if cos >= SAME { (1, 2.5) } else { (0, 1.2) };
             // Neighbours have a small arc, those far apart a wide one.
-            let reach = REACH_PX * ((below - above) as f64 / most).sqrt();
+            let reach = ARC_REACH_PX * ((below - above) as f64 / most).sqrt();
             let (top, bottom) = (y(above), y(below));
             write!(
                 text,

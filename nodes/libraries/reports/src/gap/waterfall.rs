@@ -20,7 +20,7 @@ use crate::svg::{Scale, escaped, short};
 
 /// Most causes with a bar of their own; the others share one.
 const MOST_BARS: usize = 6;
-const WIDTH: f64 = 720.0;
+const WATERFALL_WIDTH: f64 = 720.0;
 /// Height of a bar with its text, px.
 const ROW_PX: f64 = 60.0;
 /// Left and right end of the bars, px.
@@ -111,7 +111,7 @@ fn drawn(bars: &[Bar], floor_um: f64) -> Result<String, std::fmt::Error> {
         high_px: BARS_PX[1],
     };
     let mut text = format!(
-        "<svg class=\"plot\" role=\"img\" aria-label=\"waterfall of the gap\" viewBox=\"0 0 {WIDTH} {height}\">"
+        "<svg class=\"plot\" role=\"img\" aria-label=\"waterfall of the gap\" viewBox=\"0 0 {WATERFALL_WIDTH} {height}\">"
     );
     for (row, bar) in bars.iter().enumerate() {
         let (a, b) = (scale.px(bar.from_um), scale.px(bar.to_um));
@@ -129,7 +129,7 @@ fn drawn(bars: &[Bar], floor_um: f64) -> Result<String, std::fmt::Error> {
         text,
         "<path stroke=\"currentColor\" stroke-dasharray=\"5 4\" d=\"M{at:.1} 26V{:.1}\"/><text x=\"{:.1}\" y=\"{:.1}\">floor {} µm</text>",
         bottom + 6.0,
-        at.min(WIDTH - 220.0),
+        at.min(WATERFALL_WIDTH - 220.0),
         bottom + 28.0,
         short(floor_um)
     )?;
