@@ -135,7 +135,7 @@ pub fn banded_svg(plot: &Plot, bands: &[Band]) -> Result<String> {
     paired_svg(plot, bands, &[])
 }
 
-/// The same with traces that share colours; `colours`: the number of each trace's colour, its place where there is none.
+/// The same with traces that share colours; `colours`: the number of each trace's colour, or its place without one.
 ///
 /// # Errors
 /// As [`svg`].
