@@ -402,20 +402,23 @@ impl Mapping {
         self.uses.values().any(is_position)
     }
 
+    /// The axes with a commanded position, or with an actual one.
+    #[must_use]
+    pub fn axes(&self, wanted_commanded: bool) -> AxisSet {
+        let told = self.uses.values().filter_map(move |used| match used {
+            Use::Position {
+                axes, commanded, ..
+            } if *commanded == wanted_commanded => Some(axes.iter()),
+            _ => None,
+        });
+        told.flatten().copied().collect()
+    }
+
     /// The axes of which no commanded position is told.
     #[must_use]
     pub fn uncommanded(&self) -> AxisSet {
-        let axes = |wanted: bool| -> AxisSet {
-            let told = self.uses.values().filter_map(move |used| match used {
-                Use::Position {
-                    axes, commanded, ..
-                } if *commanded == wanted => Some(axes.iter()),
-                _ => None,
-            });
-            told.flatten().copied().collect()
-        };
-        let commanded = axes(true);
-        axes(false)
+        let commanded = self.axes(true);
+        self.axes(false)
             .iter()
             .filter(|axis| !commanded.contains(*axis))
             .collect()

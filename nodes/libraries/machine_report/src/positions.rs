@@ -1,7 +1,9 @@
 //! Positions of the axes, put together from values that come one by one.
 //!
 //! Values with one stamp belong together: they give one state, once another stamp comes or nothing has come for
-//! [`SETTLE`]. An axis that is absent is not in the state. The velocity is that between two stamps,
+//! [`SETTLE`]. An axis that is absent is not in the state. After a start and after a break of the connection, the
+//! axes come one by one: no state is given until each axis of the mapping has come or is absent, at most for
+//! [`GATHER`]. The velocity is that between two stamps,
 //!
 //! ```text
 //!   v = (p_k − p_{k−1}) / (t_k − t_{k−1})                                                    (1)
@@ -16,6 +18,9 @@ use metrology::{Axis, AxisSet, PerAxis};
 
 /// A state is told this long after its last value came.
 pub const SETTLE: Span = Span::from_nanos(100_000_000);
+
+/// States wait at most so long for an axis that has not come yet.
+pub const GATHER: Span = Span::from_nanos(5_000_000_000);
 
 #[derive(Clone, Copy, Debug)]
 struct Open {
@@ -32,9 +37,30 @@ pub struct Positions {
     velocity: PerAxis<f64>,
     told_at: PerAxis<Stamp<Machine>>,
     open: Option<Open>,
+    /// Axes of the mapping that have neither come nor are known to be absent.
+    awaited: AxisSet,
+    first_at: Option<Stamp<Host>>,
 }
 
 impl Positions {
+    /// Of a machine whose axes are these, none of which has come.
+    #[must_use]
+    pub fn awaiting(axes: AxisSet) -> Self {
+        Self {
+            awaited: axes,
+            ..Self::default()
+        }
+    }
+
+    /// Forgets all positions, after a break.
+    pub fn forget(&mut self, axes: AxisSet) {
+        *self = Self::awaiting(axes);
+    }
+
+    fn no_longer_await(&mut self, axis: Axis) {
+        self.awaited = self.awaited.iter().filter(|one| *one != axis).collect();
+    }
+
     /// Takes the position of an axis, mm or rad; returns the state before it where that is whole by now.
     pub fn hear(
         &mut self,
@@ -57,6 +83,7 @@ impl Positions {
                 0.0
             };
             self.axes = self.axes.with(axis);
+            self.no_longer_await(axis);
             self.actual[axis] = position;
             self.told_at[axis] = machine_at;
         }
@@ -64,6 +91,7 @@ impl Positions {
             machine_at,
             received_at,
         });
+        self.first_at.get_or_insert(received_at);
         whole
     }
 
@@ -73,6 +101,7 @@ impl Positions {
         self.commanded[axis] = None;
         if !commanded {
             self.axes = self.axes.iter().filter(|other| *other != axis).collect();
+            self.no_longer_await(axis);
         }
         whole
     }
@@ -89,7 +118,9 @@ impl Positions {
     /// The open state.
     pub fn take(&mut self) -> Option<AxisState> {
         let open = self.open.take()?;
-        if self.axes.is_empty() {
+        let waited = self.first_at.map(|first_at| open.received_at - first_at);
+        let is_gathering = !self.awaited.is_empty() && waited.is_some_and(|waited| waited < GATHER);
+        if self.axes.is_empty() || is_gathering {
             return None;
         }
         Some(AxisState {
@@ -153,6 +184,30 @@ mod tests {
         assert!(positions.absent(Axis::C, false).is_some());
         positions.hear(Axis::C, true, 0.7, at(3.0), host(3.0));
         assert!(positions.take().is_none());
+    }
+
+    #[test]
+    fn no_state_is_given_before_each_axis_has_come_or_is_absent() {
+        let axes = [Axis::X, Axis::Y, Axis::Z].into_iter().collect();
+        let mut positions = Positions::awaiting(axes);
+        positions.hear(Axis::X, false, 1.0, at(1.0), host(1.0));
+        assert!(
+            positions
+                .hear(Axis::Y, false, 2.0, at(1.1), host(1.1))
+                .is_none()
+        );
+        assert!(positions.settled(host(1.3)).is_none());
+        assert!(positions.absent(Axis::Z, false).is_none());
+        positions.hear(Axis::X, false, 1.5, at(1.4), host(1.4));
+        let state = positions.take().unwrap();
+        assert_eq!(state.axes.iter().collect::<Vec<_>>(), [Axis::X, Axis::Y]);
+
+        positions.forget(axes);
+        positions.hear(Axis::Y, false, 2.0, at(2.0), host(2.0));
+        positions.hear(Axis::X, false, 1.0, at(2.0), host(2.0));
+        assert!(positions.take().is_none());
+        positions.hear(Axis::X, false, 1.0, at(7.1), host(7.1));
+        assert_eq!(positions.take().unwrap().axes.len(), 2);
     }
 
     #[test]

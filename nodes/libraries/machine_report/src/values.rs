@@ -90,9 +90,9 @@ impl Values {
             .map(|(key, used)| (key.to_owned(), channel(used)))
             .collect();
         Self {
+            positions: Positions::awaiting(mapping.axes(false)),
             mapping,
             channels,
-            positions: Positions::default(),
             clock: MachineClock::default(),
             unmapped: BTreeSet::new(),
             watch: Watch::default(),
@@ -513,6 +513,7 @@ impl Values {
             }
             self.channels.insert(key, channel);
         }
+        self.positions.forget(self.mapping.axes(false));
         self.clock.forget();
         self.watch.forget();
     }

@@ -33,9 +33,9 @@ const PROGRAMS: [(&str, &str); 5] = [
 ];
 /// Processes that exist while a LinuxCNC runs.
 const PROCESSES: [&str; 4] = ["linuxcncrsh", "linuxcncsvr", "milltask", "rtapi_app"];
-/// Arguments: INI file, host, port, connect password, enable password.
+/// Arguments: INI file, host, port, connect password, enable password, file that appears when LinuxCNC has ended.
 const GUARD: &str = r#"
-linuxcnc -r "$1" </dev/null &
+{ linuxcnc -r "$1" </dev/null; : >"$6"; } &
 read -r _
 if exec 3<>"/dev/tcp/$2/$3"; then
   printf 'hello %s abbe 1.0\r\nset enable %s\r\nshutdown\r\n' "$4" "$5" >&3
@@ -43,6 +43,8 @@ if exec 3<>"/dev/tcp/$2/$3"; then
 fi
 wait
 "#;
+/// The file of the working directory that appears when LinuxCNC has ended.
+const ENDED: &str = "abbe_linuxcnc_ended";
 /// What the guard is called.
 const GUARD_NAME: &str = "abbe-linuxcnc-guard";
 /// LinuxCNC that starts while the last one's real-time part is still being unloaded ends at once: so often,
@@ -263,11 +265,12 @@ impl Controller {
         let limit_s = config.connection.start_timeout_s;
         let deadline = Instant::now() + Duration::from_secs_f64(limit_s.max(0.0));
         let port = config.connection.port;
-        let mut seen = false;
+        let ended = self.account.home().join(ENDED);
         while Instant::now() < deadline {
+            // Looked for before the processes: what runs after it is no part of a start.
+            let has_ended = ended.exists();
             let alive = running();
-            seen |= !alive.is_empty();
-            if seen && alive.is_empty() {
+            if has_ended && alive.is_empty() {
                 let last_words = self.last_words();
                 return Err(BridgeError::EndedAtStart {
                     ini: ini.to_owned(),
@@ -376,6 +379,7 @@ fn spawn_guard(
         .arg(ini)
         .args([&connection.host, &connection.port.to_string()])
         .args([&connection.connect_password, &connection.enable_password])
+        .arg(account.home().join(ENDED))
         // A Ctrl-C at the terminal reaches this process; the guard then ends LinuxCNC in order.
         .process_group(0)
         .stdin(Stdio::piped())

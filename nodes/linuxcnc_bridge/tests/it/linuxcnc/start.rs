@@ -49,6 +49,14 @@ fn a_second_start_is_refused_and_a_wrong_configuration_says_what_is_wrong() {
     assert!(matches!(ended, BridgeError::EndedAtStart { .. }), "{ended}");
     assert!(ended.to_string().contains("no_such_component"), "{ended}");
 
+    // It ends before any process of LinuxCNC's is there to be seen.
+    std::fs::write(&broken, "[DISPLAY]\nDISPLAY = linuxcncrsh\n").unwrap();
+    let ended = Controller::start(&rig.config, &broken)
+        .map(|_| ())
+        .unwrap_err();
+    println!("{ended}");
+    assert!(matches!(ended, BridgeError::EndedAtStart { .. }), "{ended}");
+
     let mut nobody = rig.config.clone();
     nobody.user = "root".to_owned();
     if nix::unistd::geteuid().is_root() {
