@@ -10,3 +10,4 @@ mod blind;
 mod floor;
 mod page;
 mod series;
+mod shop;

@@ -196,7 +196,7 @@ fn an_arm_that_is_none_is_refused_with_those_that_are() {
     assert!(
         ended
             .said
-            .contains("must be one of i ii iii iv v vi alone vii limit own own-left-out"),
+            .contains("must be one of i ii iii iv v vi alone vii limit own own-left-out s1 s2 s3"),
         "{}",
         ended.said
     );

@@ -20,7 +20,7 @@ mod completions;
 pub mod diagnose;
 mod export;
 mod history;
-mod import;
+pub mod import;
 mod import_map;
 mod import_shift;
 mod install_ros;

@@ -78,11 +78,19 @@ fn closed_to_others(place: &Path) -> Result<Option<PathBuf>> {
     Ok(None)
 }
 
-/// Runs `abbe diagnose` on bags in its own folder.
+/// This program in a trial's folder, without an environment.
+pub struct Process {
+    /// Its command, to which arguments are added.
+    pub command: Command,
+    /// The program itself, where it is handed over: open until it has ended.
+    _handed: Option<File>,
+}
+
+/// The diagnosis in a folder: as nobody, where this program runs as root.
 ///
 /// # Errors
-/// When the process cannot be started, or says what is no report.
-pub fn as_process(folder: &Path, bags: &[&str], question: &Question<'_>) -> Result<Diagnosed> {
+/// When nobody may look into the folder.
+pub fn process(folder: &Path) -> Result<Process> {
     let is_root = nix::unistd::geteuid().is_root();
     if is_root && let Some(closed) = closed_to_others(folder)? {
         bail!(
@@ -101,11 +109,28 @@ pub fn as_process(folder: &Path, bags: &[&str], question: &Question<'_>) -> Resu
     let mut command = Command::new(handed.as_ref().map_or(program, of_handed));
     command
         .arg("diagnose")
-        .args(bags)
-        .args(["--machine", "machine.yaml", "--json", "-"])
         .current_dir(folder)
         .env_clear()
         .stdin(Stdio::null());
+    if is_root {
+        command.uid(NOBODY).gid(NOBODY);
+    }
+    Ok(Process {
+        command,
+        _handed: handed,
+    })
+}
+
+/// Runs `abbe diagnose` on bags in its own folder.
+///
+/// # Errors
+/// When the process cannot be started, or says what is no report.
+pub fn as_process(folder: &Path, bags: &[&str], question: &Question<'_>) -> Result<Diagnosed> {
+    let mut process = process(folder)?;
+    let command = &mut process.command;
+    command
+        .args(bags)
+        .args(["--machine", "machine.yaml", "--json", "-"]);
     if let Some(class) = question.left_out {
         command.args(["--without", class]);
     }
@@ -118,9 +143,6 @@ pub fn as_process(folder: &Path, bags: &[&str], question: &Question<'_>) -> Resu
     }
     if let Some(rule) = question.ablated {
         command.args(["--ablate", rule.id()]);
-    }
-    if is_root {
-        command.uid(NOBODY).gid(NOBODY);
     }
     let output = command.output().context("abbe diagnose")?;
     if !output.status.success() {

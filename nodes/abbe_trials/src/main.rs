@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use abbe::diagnose::Diagnose;
+use abbe::import::Import;
 use abbe::preflight::Preflight;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
@@ -32,6 +33,7 @@ mod programmes;
 mod seal;
 mod series;
 mod session_bag;
+mod shop;
 mod table;
 mod tree;
 mod trial;
@@ -63,6 +65,9 @@ enum Verb {
     /// `abbe diagnose`: the process that this program starts for each trial.
     #[command(hide = true)]
     Diagnose(Diagnose),
+    /// `abbe import`: the process that makes bags of a shop's tables.
+    #[command(hide = true)]
+    Import(Import),
     /// `abbe preflight`: the process that designs a programme for a drawn machine file.
     #[command(hide = true)]
     Preflight(Preflight),
@@ -75,7 +80,8 @@ enum Verb {
 struct Trials {
     /// Arms, by number: i catalogue, ii a class left out, iii different physics, iv null, v null with worse noise,
     /// vi confusable pairs, vii the same with one more run of the diagnosis' choice; alone: each class in turn, large enough to be named;
-    /// limit: each class in turn, about as small as can be named; own, own-left-out: classes with programmes of their own.
+    /// limit: each class in turn, about as small as can be named; own, own-left-out: classes with programmes of their own;
+    /// s1 a shop's ISO 230-2 run, s2 its ballbar, s3 its logs: with a table of their own.
     #[arg(long, value_delimiter = ',', default_value = "i")]
     arm: Vec<Arm>,
     /// Trials in each arm.
@@ -133,6 +139,7 @@ fn main() -> ExitCode {
     let Arguments { trials, verb } = Arguments::parse();
     let outcome = match verb {
         Some(Verb::Diagnose(diagnose)) => diagnose.execute(),
+        Some(Verb::Import(import)) => import.execute(),
         Some(Verb::Preflight(preflight)) => preflight.execute(),
         Some(Verb::Programmes(programmes)) => programmes.execute(),
         None => trials.execute(),
@@ -159,6 +166,7 @@ impl Trials {
         std::fs::create_dir_all(&self.out).with_context(|| format!("{}", self.out.display()))?;
         let mut journal = Journal::open(&self.out.join("journal.jsonl"))?;
         let arms: BTreeSet<Arm> = self.arm.iter().copied().collect();
+        let is_of_a_shop = self.is_of_a_shop(&arms)?;
         let made_now = (!self.tabulate).then_some(MEASURE);
         one_measure(journal.verdicts(), seed, made_now)
             .with_context(|| format!("{}", self.out.join("journal.jsonl").display()))?;
@@ -186,16 +194,41 @@ impl Trials {
             truth.seed == seed && truth.index < self.n && arms.contains(&truth.arm)
         };
         let verdicts: Vec<Verdict> = journal.verdicts().iter().filter(own).cloned().collect();
-        self.publish(&table::Table::of(&arms, seed, &verdicts, self.in_process))?;
+        if is_of_a_shop {
+            self.publish(&shop::Table::of(&arms, seed, &verdicts).contents()?)?;
+        } else {
+            let table = table::Table::of(&arms, seed, &verdicts, self.in_process);
+            let [terminal, json] = [table.terminal()?, table.json()?];
+            self.publish(&[terminal, json, table.html()?, table.markdown()?])?;
+        }
         Ok(ExitCode::SUCCESS)
     }
 
-    fn publish(&self, table: &table::Table) -> Result<()> {
-        abbe::tell::line(format_args!("{}", table.terminal()?));
+    /// Whether the arms are those of a shop, whose sessions need bags and have a table of their own.
+    fn is_of_a_shop(&self, arms: &BTreeSet<Arm>) -> Result<bool> {
+        let of_a_shop = arms.iter().filter(|arm| arm.is_of_a_shop()).count();
+        if of_a_shop == 0 {
+            return Ok(false);
+        }
+        if of_a_shop < arms.len() {
+            bail!("--arm: s1, s2 and s3 have a table of their own; run them without other arms");
+        }
+        if self.in_process || self.baselines || !self.ablate.is_empty() {
+            bail!(
+                "--arm s1, s2, s3: sessions of tables are imported and diagnosed as processes with all rules; \
+                 leave out --in-process, --baselines and --ablate"
+            );
+        }
+        Ok(true)
+    }
+
+    /// Prints a table and writes it: for a terminal, as JSON, as a page and as Markdown.
+    fn publish(&self, [terminal, json, html, markdown]: &[String; 4]) -> Result<()> {
+        abbe::tell::line(format_args!("{terminal}"));
         for (path, contents) in [
-            (&self.json, table.json()?),
-            (&self.html, table.html()?),
-            (&self.markdown, table.markdown()?),
+            (&self.json, json),
+            (&self.html, html),
+            (&self.markdown, markdown),
         ] {
             if let Some(path) = path {
                 std::fs::write(path, contents).with_context(|| format!("{}", path.display()))?;

@@ -192,6 +192,7 @@ impl Programmes {
                 likeness: vec![],
                 later_closed: None,
                 second: None,
+                shop: None,
             },
         })
     }

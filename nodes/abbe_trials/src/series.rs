@@ -11,6 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use trials::{Arm, Verdict};
 
 use crate::journal::Journal;
+use crate::shop;
 use crate::trial::{How, Which};
 
 /// A series.
@@ -111,20 +112,19 @@ fn tell(bar: &ProgressBar, line: &str) {
 /// One trial in a line.
 fn sentence(verdict: &Verdict) -> String {
     let truth = &verdict.truth;
-    let effects: Vec<String> = truth
-        .effects
-        .iter()
-        .map(|e| {
-            format!(
-                "{} {} {:.3} {} (D {:.0})",
-                e.class.id(),
-                e.axis,
-                e.size,
-                e.unit,
-                e.d
-            )
-        })
-        .collect();
+    let of_a_shop = truth.shop.iter().flat_map(|shop| &shop.effects);
+    let mut effects: Vec<String> = of_a_shop.map(shop::effect_words).collect();
+    let of_the_plant = truth.effects.iter().map(|e| {
+        format!(
+            "{} {} {:.3} {} (D {:.0})",
+            e.class.id(),
+            e.axis,
+            e.size,
+            e.unit,
+            e.d
+        )
+    });
+    effects.extend(of_the_plant);
     let hidden = if effects.is_empty() {
         "nothing".to_owned()
     } else {

@@ -213,7 +213,7 @@ impl Part<'_> {
 const TITLE: &str = "Blind trials of the diagnosis";
 
 /// What it ran on.
-fn computer() -> String {
+pub(crate) fn computer() -> String {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = text

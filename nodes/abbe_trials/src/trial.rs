@@ -12,7 +12,7 @@ use trials::{Arm, Rig, Second, Trial, Truth, Verdict, judge, likeness};
 
 use crate::blind::{self, Beside, Diagnosed, Question};
 use crate::seal::Seal;
-use crate::{later, session_bag};
+use crate::{later, session_bag, shop};
 
 /// How trials are made.
 pub struct How {
@@ -73,6 +73,9 @@ impl How {
     /// # Errors
     /// When it cannot be made.
     pub fn trial(&self, which: &Which<'_>, tell: &dyn Fn(&str)) -> Result<Vec<Verdict>> {
+        if which.arm.is_of_a_shop() {
+            return shop::trial(self, which, tell);
+        }
         let began = Instant::now();
         let mut trial = Trial::draw(which.arm, which.seed, which.index)?;
         if which.has_oracle() && !trial.truth.effects.is_empty() {
@@ -275,6 +278,7 @@ fn verdicts(truth: &Truth, sha256: &str, said: Said) -> Vec<Verdict> {
             },
             later_closed: later_closed.filter(|_| is_whole),
             second: second.take().filter(|_| is_whole),
+            shop: None,
         }
     };
     answers.into_iter().map(of).collect()

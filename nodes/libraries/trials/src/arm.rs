@@ -34,11 +34,17 @@ pub enum Arm {
     Own,
     /// One effect of such a class, which the diagnosis is told to leave out.
     OwnLeftOut,
+    /// One ISO 230-2 run of a shop.
+    ShopPositioning,
+    /// Circles of a shop's ballbar.
+    ShopBallbar,
+    /// Logs of a shop's displacement sensor and thermometers.
+    ShopLogs,
 }
 
 impl Arm {
     /// Every arm, in order.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 14] = [
         Self::Catalogue,
         Self::LeftOut,
         Self::Foreign,
@@ -50,6 +56,9 @@ impl Arm {
         Self::Limit,
         Self::Own,
         Self::OwnLeftOut,
+        Self::ShopPositioning,
+        Self::ShopBallbar,
+        Self::ShopLogs,
     ];
 
     /// Its number in the protocol; the others go by their names.
@@ -67,6 +76,9 @@ impl Arm {
             "limit",
             "own",
             "own-left-out",
+            "s1",
+            "s2",
+            "s3",
         ][self as usize]
     }
 
@@ -85,6 +97,9 @@ impl Arm {
             "each class alone, about as small as can be named",
             "classes with programmes of their own",
             "classes with programmes of their own, left out",
+            "a shop's ISO 230-2 run",
+            "a shop's ballbar",
+            "a shop's logs of displacement and temperatures",
         ][self as usize]
     }
 
@@ -92,6 +107,15 @@ impl Arm {
     #[must_use]
     pub const fn leaves_out(self) -> bool {
         matches!(self, Self::LeftOut | Self::OwnLeftOut)
+    }
+
+    /// Whether its sessions are tables as shops have them.
+    #[must_use]
+    pub const fn is_of_a_shop(self) -> bool {
+        matches!(
+            self,
+            Self::ShopPositioning | Self::ShopBallbar | Self::ShopLogs
+        )
     }
 
     /// Whether its machines have nothing to be named.

@@ -9,6 +9,8 @@
 //! them, `covariate` knows what a leftover should go with, `target` says which figures are as good as they should be;
 //! `compared` has the programmes that a designed one is compared with; `comparison` puts the methods of `baseline` and diagnoses without one of their rules before the same judge.
 //!
+//! `shop` has generator, judge and table of the sessions that shops bring, in files of its own.
+//!
 //! `size` says how large a hidden effect is for these measurements: D, the root of its chi-square against the
 //! trial's own scatter, of which the generator, unlike the diagnoser, knows the covariance.
 
@@ -31,6 +33,7 @@ pub mod rig;
 #[cfg(test)]
 mod sample;
 pub mod scatter;
+pub mod shop;
 mod size;
 pub mod tally;
 pub mod target;

@@ -48,6 +48,7 @@ pub fn verdict(effects: Vec<TrueEffect>, causes: Vec<SaidCause>, is_unknown: boo
             has_outliers: false,
             has_motors: true,
             bare_um: Some(0.28),
+            shop: None,
             measure: crate::truth::MEASURE,
         },
         truth_sha256: String::new(),
@@ -73,5 +74,6 @@ pub fn verdict(effects: Vec<TrueEffect>, causes: Vec<SaidCause>, is_unknown: boo
         likeness: vec![],
         later_closed: None,
         second: None,
+        shop: None,
     }
 }

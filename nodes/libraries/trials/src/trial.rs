@@ -92,6 +92,7 @@ impl Trial {
             has_motors: rig.has_motors,
             bare_um: None,
             measure: MEASURE,
+            shop: None,
         };
         Ok(Self {
             rig,
@@ -101,7 +102,7 @@ impl Trial {
     }
 }
 
-fn stream(arm: Arm, seed: u64, index: u64) -> Pcg64Mcg {
+pub(crate) fn stream(arm: Arm, seed: u64, index: u64) -> Pcg64Mcg {
     let mut key = [0_u8; 16];
     key[..8].copy_from_slice(&seed.to_le_bytes());
     key[8..].copy_from_slice(&((arm as u64) << 48 | index).to_le_bytes());

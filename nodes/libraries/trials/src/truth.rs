@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
 use crate::effect::{Class, Hidden};
+use crate::shop::ShopTruth;
 
 /// The truth of one trial.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,6 +35,30 @@ pub struct Truth {
     /// Which measure its D have; trials of different ones are not of one series.
     #[serde(default = "first_measure")]
     pub measure: u32,
+    /// What is true of a shop's session, of which the fields above say nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shop: Option<ShopTruth>,
+}
+
+impl Truth {
+    /// The truth of a shop's session.
+    #[must_use]
+    pub const fn of_a_shop(arm: Arm, seed: u64, index: u64, shop: ShopTruth) -> Self {
+        Self {
+            arm,
+            index,
+            seed,
+            effects: vec![],
+            left_out: None,
+            between_runs_um: shop.between_runs_um,
+            white_um: shop.white_um,
+            has_outliers: true,
+            has_motors: false,
+            bare_um: None,
+            measure: MEASURE,
+            shop: Some(shop),
+        }
+    }
 }
 
 /// The measure of D of this program (`size`): 2, as a stop of a positioning run is one row. By 1 it was as many as it had

@@ -11,6 +11,7 @@ use gap_diagnosis::{GapReport, Rule};
 use serde::{Deserialize, Serialize};
 
 use crate::baseline::{Method, Names};
+use crate::shop::Answer;
 use crate::truth::{TrueEffect, Truth};
 
 /// Least share of the squared gap that the truth must close for a ratio to mean something.
@@ -49,6 +50,9 @@ pub struct Verdict {
     /// What one more run, of the diagnosis' choice, changed.
     #[serde(default)]
     pub second: Option<Second>,
+    /// What the answer to a shop's session has beside its causes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shop: Option<Answer>,
 }
 
 /// What a hidden effect looks like on the recording, by the signatures alone, before anything is measured.

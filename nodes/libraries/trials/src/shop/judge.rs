@@ -1,0 +1,223 @@
+//! The answer to a shop's session beside its truth.
+//!
+//! Where two effects make the same readings, the only right answer is a set with both; a single name is wrong there, even if
+//! it is the truth's.
+
+use gap_diagnosis::GapReport;
+use gap_diagnosis::report::Status;
+use serde::{Deserialize, Serialize};
+
+use super::truth::{Follow, Name, ShopEffect, ShopTruth};
+use crate::verdict::{SaidCause, Verdict};
+
+/// What an answer has beside its causes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Answer {
+    /// Changes between repeats that no name explains.
+    pub does_not_repeat: usize,
+    /// Thermometers that the log goes with, by the page's remark.
+    pub follows: Vec<Follow>,
+}
+
+/// What a report and its page add to the causes.
+#[must_use]
+pub fn answer(report: &GapReport, page: &str) -> Answer {
+    Answer {
+        does_not_repeat: report.does_not_repeat.len(),
+        follows: follows_in(page),
+    }
+}
+
+/// Thermometers in the remarks of a page.
+#[must_use]
+pub fn follows_in(page: &str) -> Vec<Follow> {
+    let remarks = page.lines().filter_map(|line| {
+        let (channel, rest) = line.split_once(" goes with ")?;
+        let is_remark = !channel.trim().contains(' ') && rest.contains("µm/K");
+        is_remark.then(|| rest.split_once(": ").map_or(rest, |(terms, _)| terms))
+    });
+    remarks
+        .flat_map(|terms| terms.split(", and with ").filter_map(follow))
+        .collect()
+}
+
+/// `rear lagged by 44.4 min, 1.20 µm/K`, or `table without a lag, -3.2 µm/K`.
+fn follow(term: &str) -> Option<Follow> {
+    let (thermometer, rest) = term.split_once(' ')?;
+    let (lag, size) = rest.split_once(", ")?;
+    let lag_min = match lag.strip_prefix("lagged by ") {
+        Some(lag) => lag.strip_suffix(" min")?.parse().ok()?,
+        None => 0.0,
+    };
+    Some(Follow {
+        thermometer: thermometer.to_owned(),
+        lag_min,
+        um_per_k: size.strip_suffix(" µm/K")?.parse().ok()?,
+    })
+}
+
+/// What a named cause is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Call {
+    /// The name of a hidden effect, which nothing imitates.
+    Right,
+    /// A set with a hidden effect, and with what imitates it where something does.
+    InSet,
+    /// True beside a hidden effect.
+    Beside,
+    /// The name of a hidden effect alone, although others make the same readings.
+    TooSure,
+    /// Neither.
+    Wrong,
+}
+
+impl Call {
+    /// Whether it counts as a wrong name.
+    #[must_use]
+    pub const fn is_wrong(self) -> bool {
+        matches!(self, Self::TooSure | Self::Wrong)
+    }
+}
+
+/// All that a cause may be by its own words.
+fn members(cause: &SaidCause) -> Vec<Name> {
+    let mut all = vec![(cause.effect.clone(), cause.axis.clone())];
+    if cause.status == Status::Set {
+        all.extend(cause.rivals.iter().cloned());
+    }
+    all
+}
+
+/// A named cause as the call that one hidden effect makes of it.
+fn call_by(cause: &SaidCause, effect: &ShopEffect) -> Call {
+    let members = members(cause);
+    let leads = effect.has_name(&members[0]);
+    let holds = members.iter().any(|member| effect.has_name(member));
+    let has_same = members
+        .iter()
+        .any(|member| effect.same_readings.contains(member));
+    match (effect.same_readings.is_empty(), holds) {
+        (true, true) if leads => Call::Right,
+        (true, true) => Call::InSet,
+        (false, true) if has_same => Call::InSet,
+        (false, true) => Call::TooSure,
+        (_, false) if effect.besides.contains(&members[0]) => Call::Beside,
+        (_, false) => Call::Wrong,
+    }
+}
+
+/// What a named cause is: the best that a hidden effect makes of it.
+#[must_use]
+pub fn call(cause: &SaidCause, truth: &ShopTruth) -> Call {
+    let calls: Vec<Call> = truth
+        .effects
+        .iter()
+        .map(|effect| call_by(cause, effect))
+        .collect();
+    let best = [Call::Right, Call::InSet, Call::Beside, Call::TooSure];
+    let found = best.into_iter().find(|call| calls.contains(call));
+    found.unwrap_or(Call::Wrong)
+}
+
+/// Wrong names of a verdict, with what each is.
+pub fn wrong_names(verdict: &Verdict) -> Vec<(Name, Call)> {
+    let Some(truth) = &verdict.truth.shop else {
+        return vec![];
+    };
+    let called = verdict.named().map(|cause| (cause, call(cause, truth)));
+    called
+        .filter(|(_, call)| call.is_wrong())
+        .map(|(cause, call)| ((cause.effect.clone(), cause.axis.clone()), call))
+        .collect()
+}
+
+/// Whether a hidden effect was found as far as the session can tell it: by its name, or in the set.
+pub fn is_found(verdict: &Verdict, effect: &ShopEffect) -> bool {
+    let wanted = if effect.is_resolvable() {
+        Call::Right
+    } else {
+        Call::InSet
+    };
+    verdict
+        .named()
+        .any(|cause| call_by(cause, effect) == wanted)
+}
+
+/// Whether there was any alarm.
+pub fn has_alarm(verdict: &Verdict) -> bool {
+    let does_not_repeat = verdict
+        .shop
+        .as_ref()
+        .is_some_and(|answer| answer.does_not_repeat > 0);
+    verdict.named().next().is_some() || verdict.is_flagged() || does_not_repeat
+}
+
+/// Relative errors of lag and growth that the page reports for a hidden effect.
+pub fn followed(verdict: &Verdict, effect: &ShopEffect) -> Option<[f64; 2]> {
+    let right = effect.follow.as_ref()?;
+    let mut found = verdict.shop.iter().flat_map(|answer| &answer.follows);
+    let own = found.find(|follow| follow.thermometer == right.thermometer)?;
+    Some([
+        own.lag_min / right.lag_min - 1.0,
+        own.um_per_k / right.um_per_k - 1.0,
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample::cause;
+    use crate::shop::truth::name;
+
+    fn play(same_readings: Vec<Name>) -> ShopTruth {
+        ShopTruth {
+            session: String::new(),
+            layout: String::new(),
+            repeats: 5,
+            places: 11,
+            effects: vec![ShopEffect {
+                what: "lost motion".to_owned(),
+                names: vec![name("backlash", "X")],
+                besides: vec![name("scale_error", "X")],
+                same_readings,
+                size: 5.0,
+                unit: "µm".to_owned(),
+                d: 40.0,
+                d_alone: 40.0,
+                follow: None,
+            }],
+            white_um: 0.2,
+            between_runs_um: 0.1,
+            memory: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_single_name_is_wrong_where_another_effect_reads_the_same() {
+        let own = cause("backlash", "X", Status::Named, 5.0);
+        assert_eq!(call(&own, &play(vec![])), Call::Right);
+        let truth = play(vec![name("feed_lost_motion", "X")]);
+        assert_eq!(call(&own, &truth), Call::TooSure);
+        let mut set = cause("backlash", "X", Status::Set, 5.0);
+        assert_eq!(call(&set, &truth), Call::TooSure);
+        set.rivals = vec![name("feed_lost_motion", "X")];
+        assert_eq!(call(&set, &truth), Call::InSet);
+        assert_eq!(call(&set, &play(vec![])), Call::Right);
+        let other = cause("cyclic_error", "X", Status::Named, 5.0);
+        assert_eq!(call(&other, &truth), Call::Wrong);
+        let slope = cause("scale_error", "X", Status::Named, 5.0);
+        assert_eq!(call(&slope, &truth), Call::Beside);
+    }
+
+    #[test]
+    fn remarks_of_thermometers_are_read_and_tables_are_not() {
+        let page = "length.Z goes with rear lagged by 44.4 min, 1.20 µm/K, and with bed without a lag, -3.2 µm/K: on runs\n\
+            most of it is in length.Z and goes with time; 3 µm/K\n";
+        let found = follows_in(page);
+        assert_eq!(found.len(), 2);
+        assert_eq!(found[0].thermometer, "rear");
+        assert!((found[0].lag_min - 44.4).abs() < 1e-12 && found[1].lag_min.abs() < 1e-12);
+        assert!((found[1].um_per_k + 3.2).abs() < 1e-12);
+    }
+}
