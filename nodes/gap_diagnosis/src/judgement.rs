@@ -5,6 +5,7 @@
 
 pub(crate) mod along;
 pub(crate) mod aside;
+pub(crate) mod by_thermometer;
 pub(crate) mod cause;
 pub(crate) mod confidence;
 pub(crate) mod confirm;
@@ -62,6 +63,8 @@ pub enum CheckId {
     BeatsRuns,
     /// It is found in the scatter within the stations alone.
     WithinStations,
+    /// The log goes with a thermometer that drives it.
+    OwnThermometer,
     /// The noise of the session is that of its repeats.
     NoiseFloor,
     /// No other effect does nearly as well; if one does, the cause is one of a set.
@@ -218,6 +221,10 @@ impl CheckId {
                 "found in the scatter within the stations as well",
                 Side::AtLeast,
             ),
+            Self::OwnThermometer => (
+                "thermometers of its own that the log goes with",
+                Side::AtLeast,
+            ),
             Self::NoiseFloor => (
                 "variance of the session's noise over that of the repeats",
                 Side::AtMost,
@@ -246,6 +253,7 @@ impl CheckId {
             Self::NotCancelled => Veto::Cancels,
             Self::BeatsShapes => Veto::Shape,
             Self::Needed => Veto::NotNeeded,
+            Self::OwnThermometer => Veto::OtherThermometer,
             Self::NoiseFloor => Veto::NoiseFloor,
             // The first two are of scatter alone, the last makes a set.
             Self::BeatsRuns | Self::WithinStations | Self::NoRival => return None,

@@ -54,6 +54,7 @@ use crate::search::rows::{Block, Rows, count};
 use crate::session::log::LONG_S;
 
 mod both_ways;
+mod memory;
 mod within_runs;
 
 /// Noise of one channel.

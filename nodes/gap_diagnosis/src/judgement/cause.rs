@@ -14,6 +14,7 @@ use twin::effects::{Kind, Moment, Parameter, Role};
 
 use crate::config::GapConfig;
 use crate::judgement::aside;
+use crate::judgement::by_thermometer;
 use crate::judgement::form_doubt;
 use crate::judgement::plain::plainest;
 use crate::judgement::rule::Rule;
@@ -89,7 +90,7 @@ impl Member {
     }
 
     /// Adds a check, or puts it in the place of an earlier one of the same rule.
-    fn put(&mut self, check: Check) {
+    pub(crate) fn put(&mut self, check: Check) {
         let mut own = self.checks.iter_mut();
         match own.find(|own| own.check == check.check) {
             Some(own) => *own = check,
@@ -162,6 +163,8 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     }
     let forms = isolability::forms(&signatures, &normal, &best.set);
     let mut members = veto::judged(scope, &signatures, &normal, &best, &forms, is_closed);
+    let thermometers = thermal::notes(stack);
+    by_thermometer::check(stack, &signatures, &mut members, &thermometers);
     resize(stack, &signatures, &normal, &mut members);
     while leave_out_small(stack, &signatures, &mut members) {
         resize(stack, &signatures, &normal, &mut members);
@@ -184,7 +187,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
         forms,
         set: best.set,
         freedom: stack.freedom(),
-        thermometers: thermal::notes(stack),
+        thermometers,
     }
 }
 

@@ -71,6 +71,8 @@ pub enum Veto {
     NotDetermined,
     /// It explains less than twice what stays unexplained.
     SmallBesideLeft,
+    /// The log goes with other thermometers.
+    OtherThermometer,
     /// The noise is not that of the repeats.
     NoiseFloor,
 }
@@ -97,6 +99,9 @@ impl fmt::Display for Veto {
             Self::WorseHeldOut => f.write_str("the held-out runs come out worse with it"),
             Self::NotDetermined => f.write_str("the recording does not determine its size"),
             Self::SmallBesideLeft => f.write_str("much more than it explains stays unexplained"),
+            Self::OtherThermometer => {
+                f.write_str("the log goes with thermometers that do not drive it")
+            }
             Self::NoiseFloor => f.write_str("the noise is not that of the repeats"),
         }
     }

@@ -2,7 +2,8 @@
 //!
 //! # Model
 //!
-//! Within a run it is that of neighbouring rows, (3) of `log`, white, greater by what so few rows leave open (`noise`).
+//! Within a run it is that of neighbouring rows, (3) of `log`, white, greater by what so few rows leave open (`noise`); where
+//! neighbours share part of it, it is an autoregression (`memory`).
 //! Between runs nothing is known, and `log::ASSUMED_BETWEEN_UM` is taken. Where nothing else was repeated a confidence counts [`CONFIDENCE`] of what it
 //! would with repeats: that the noise is white within the run, and how a second run would differ, nobody has seen.
 //!
@@ -17,7 +18,7 @@ use twin::{Channel, Session};
 use crate::noise::pace::Pace;
 use crate::noise::repeats;
 use crate::noise::whitener::Autoregression;
-use crate::noise::{self, Noise, Readings};
+use crate::noise::{self, Noise, Readings, memory};
 use crate::report::figures::Note;
 use crate::search::field::Smooth;
 use crate::search::rows::Block;
@@ -52,10 +53,13 @@ fn of_channel(
 ) -> Option<Noise> {
     let least_mm2 = noise::resolution_mm(readings.machine, channel).powi(2) / 12.0;
     let (variance_mm2, freedom) = log::variance_within(readings.session, blocks, raw, least_mm2)?;
+    let white = (Autoregression::white(variance_mm2), freedom);
+    let (within, freedom) = memory::shared(readings.session, blocks, raw).unwrap_or(white);
+    let variance_mm2 = within.variances[0].max(least_mm2);
     let within_row = repeats::within_row_variance(readings.residual, blocks);
     let between_mm = ASSUMED_BETWEEN_UM * 1e-3;
     Some(Noise {
-        within: Autoregression::white(variance_mm2 * noise::doubt(freedom)),
+        within: within.scaled(noise::doubt(freedom)),
         pace: Pace::default(),
         between: Smooth {
             offset_mm: between_mm,

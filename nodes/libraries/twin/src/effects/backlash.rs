@@ -60,7 +60,7 @@ use std::collections::BTreeSet;
 
 use metrology::Axis;
 
-use super::form::{FROM_MM, TO_MM, Travel, WAY_HATS, legendre, way_hats};
+use super::form::{FROM_MM, TO_MM, WAY_HATS, WidthByPlace, way_hats};
 use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets};
 use crate::Response;
 use crate::following::{Follower, within};
@@ -98,8 +98,6 @@ pub static KIND: Kind = Kind {
     build: |target, values| Box::new(Backlash::new(&target, values)),
 };
 
-/// Number of w_n of (7).
-const BY_PLACE: usize = 6;
 /// Place of w_1 among the values.
 const FIRST_BY_PLACE: usize = 1 + WAY_HATS + SOFT_MM_S2.len();
 
@@ -121,8 +119,7 @@ struct Backlash {
     width_mm: f64,
     free_mm: [f64; WAY_HATS],
     soft_mm: [f64; SOFT_MM_S2.len()],
-    by_place_mm: [f64; BY_PLACE],
-    part_mm: [f64; 2],
+    by_place: WidthByPlace,
 }
 
 impl Backlash {
@@ -132,8 +129,7 @@ impl Backlash {
             width_mm: values[0] * 1e-3,
             free_mm: std::array::from_fn(|k| values[1 + k] * 1e-3),
             soft_mm: std::array::from_fn(|k| values[1 + WAY_HATS + k] * 1e-3),
-            by_place_mm: std::array::from_fn(|k| values[FIRST_BY_PLACE + k] * 1e-3),
-            part_mm: [0, 1].map(|k| values[FIRST_BY_PLACE + BY_PLACE + k]),
+            by_place: WidthByPlace::new(target.axis(), &values[FIRST_BY_PLACE..]),
         }
     }
 
@@ -159,24 +155,6 @@ impl Backlash {
         for (sum, ((sense, v), a)) in response.drive[self.axis].iter_mut().zip(ticks) {
             let dragged = f64::from(*sense) * friction.coulomb_mm_s2 + friction.viscous_per_s * v;
             *sum += self.soft_mm(a + dragged);
-        }
-    }
-}
-
-impl Backlash {
-    /// Adds (7).
-    fn add_by_place(&self, scene: &Scene<'_>, response: &mut Response) {
-        if self.by_place_mm.iter().all(|width| *width == 0.0) {
-            return;
-        }
-        let travel = Travel::part(scene, self.axis, self.part_mm);
-        let motion = &scene.run.motion;
-        let ticks = motion.sense[self.axis]
-            .iter()
-            .zip(&motion.position[self.axis]);
-        for (sum, (sense, here)) in response.drive[self.axis].iter_mut().zip(ticks) {
-            let width_mm = legendre(1, &self.by_place_mm, travel.share(*here));
-            *sum -= 0.5 * f64::from(*sense) * width_mm;
         }
     }
 }
@@ -305,6 +283,6 @@ impl Effect for Backlash {
             *sum += lag_mm * self.width_mm.signum() - f64::from(sense[tick]) * free_mm; // (5)
         }
         self.add_soft(scene, response);
-        self.add_by_place(scene, response);
+        self.by_place.add_to(scene, response); // (7)
     }
 }

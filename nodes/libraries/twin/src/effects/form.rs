@@ -9,6 +9,7 @@
 use metrology::Axis;
 
 use super::{Parameter, Scene};
+use crate::Response;
 
 /// Sum of hats (1) with places `first`, `first + spacing`, ...; zero beyond the outer ones.
 pub(super) fn hats(first: f64, spacing: f64, heights: &[f64], at: f64) -> f64 {
@@ -157,6 +158,43 @@ impl Travel {
     /// Share of the half travel, (2).
     pub(super) fn share(self, position: f64) -> f64 {
         (position - self.middle) * self.per_half
+    }
+}
+
+/// Number of polynomials of a width that is another one along the axis.
+const PLACE_ORDERS: usize = 6;
+
+/// A width between both senses that is another one along the axis, x the place within the travel or a part of it, -1 to 1:
+/// `q - m += -sgn(last motion) (w_1 P_1(x) + .. + w_6 P_6(x)) / 2`.
+pub(super) struct WidthByPlace {
+    axis: Axis,
+    widths_mm: [f64; PLACE_ORDERS],
+    part_mm: [f64; 2],
+}
+
+impl WidthByPlace {
+    /// Of w_1 to w_6 in µm and the ends of the part in mm.
+    pub(super) fn new(axis: Axis, values: &[f64]) -> Self {
+        Self {
+            axis,
+            widths_mm: std::array::from_fn(|k| values[k] * 1e-3),
+            part_mm: [0, 1].map(|k| values[PLACE_ORDERS + k]),
+        }
+    }
+
+    pub(super) fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
+        if self.widths_mm.iter().all(|width| *width == 0.0) {
+            return;
+        }
+        let travel = Travel::part(scene, self.axis, self.part_mm);
+        let motion = &scene.run.motion;
+        let ticks = motion.sense[self.axis]
+            .iter()
+            .zip(&motion.position[self.axis]);
+        for (sum, (sense, here)) in response.drive[self.axis].iter_mut().zip(ticks) {
+            let width_mm = legendre(1, &self.widths_mm, travel.share(*here));
+            *sum -= 0.5 * f64::from(*sense) * width_mm;
+        }
     }
 }
 

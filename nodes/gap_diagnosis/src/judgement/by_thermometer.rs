@@ -1,0 +1,78 @@
+//! Whether an effect of the temperatures is driven by a thermometer that the log goes with.
+//!
+//! A log that goes with thermometers on runs left out (`thermal`) says which body moves the tip. An effect of another body, and an
+//! event whose time nobody recorded, can follow the same curve for a while; neither is named then.
+
+use machine::file::SensorPlace;
+use twin::effects::Target;
+
+use crate::judgement::cause::Member;
+use crate::judgement::{Check, CheckId};
+use crate::noise::stack::Stack;
+use crate::report::figures::Note;
+use crate::search::rows::count;
+use crate::search::signature::{Instance, Library};
+use crate::session::log;
+
+/// Effects and the places of the thermometers that drive them.
+const DRIVEN: [(&str, &[SensorPlace]); 2] = [
+    (
+        "spindle_growth",
+        &[SensorPlace::SpindleFront, SensorPlace::SpindleRear],
+    ),
+    (
+        "column_bend",
+        &[SensorPlace::Column, SensorPlace::Ambient, SensorPlace::Bed],
+    ),
+];
+/// Effects that begin at an instant of their own.
+const EVENTS: [&str; 2] = ["coolant", "homing_shift"];
+
+/// Adds the check to the members of a session of logs that go with thermometers.
+pub(crate) fn check(
+    stack: &Stack<'_>,
+    signatures: &Library,
+    members: &mut [Member],
+    thermometers: &[Note],
+) {
+    let runs = stack.rows.blocks.iter().map(|block| block.run);
+    let mut all = runs.map(|run| log::is_log(&stack.session.runs[run]));
+    if !all.all(|is_log| is_log) {
+        return;
+    }
+    for member in members {
+        let instance = &signatures.instances[signatures.forms[member.form].instance];
+        if let Some(drivers) = drivers(stack, instance, thermometers) {
+            let check = Check::new(CheckId::OwnThermometer, drivers > 0);
+            member.put(check.with(count(drivers), 1.0));
+        }
+    }
+}
+
+/// How many thermometers that the log goes with drive an effect; `None` where that is not asked of it.
+fn drivers(stack: &Stack<'_>, instance: &Instance, thermometers: &[Note]) -> Option<usize> {
+    let id = instance.kind.id;
+    let driven = DRIVEN.iter().find(|(driven, _)| *driven == id);
+    let places = match driven {
+        Some((_, places)) => *places,
+        None if EVENTS.contains(&id) => &[],
+        None => return None,
+    };
+    let found = thermometers.iter().filter_map(|note| match note {
+        Note::GoesWith { channel, found } => Some((channel, found)),
+        _ => None,
+    });
+    let of_axis = |channel: &str| match instance.target {
+        Target::Axis(axis) => channel.ends_with(axis.letter()),
+        _ => true,
+    };
+    let mut seen = found.filter(|(channel, _)| of_axis(channel)).peekable();
+    seen.peek()?;
+    let sensors = &stack.twin.machine().temperature_sensors;
+    let is_there = |name: &String| {
+        let mut there = sensors.iter().filter(|sensor| sensor.id == *name);
+        there.any(|sensor| places.contains(&sensor.place))
+    };
+    let by = seen.flat_map(|(_, found)| &found.by);
+    Some(by.filter(|one| is_there(&one.thermometer)).count())
+}
