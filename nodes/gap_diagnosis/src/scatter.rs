@@ -178,6 +178,7 @@ impl<'b, 's, 'a> Bench<'b, 's, 'a> {
         let signatures = Library {
             curves: Default::default(),
             aside: Default::default(),
+            shared: Default::default(),
             excited: vec![false; instances.len()],
             instances,
             forms: vec![],

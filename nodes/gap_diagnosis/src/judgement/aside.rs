@@ -12,7 +12,8 @@
 //!
 //! or up to a ten-thousandth of its square. Even at its greatest size it could not be separated from them. It is set aside:
 //! the direct error is found, and the effect that was set aside is listed with it as a possible alternative. A sum of two
-//! errors would otherwise lose to an angle that has one name.
+//! errors would otherwise lose to an angle that has one name. An angle that one direct error explains in its plain form competes with
+//! it; where it loses to a curve of that error it is listed all the same.
 //!
 //! A pitch error has any form. Where one channel was read along an axis, H is therefore every function of the target: a column for
 //! each, which is one at the readings of that target. What differs between lines, directions or times is in none of them.
@@ -43,27 +44,28 @@ const LEAST_NORM_SHARE: f64 = 1e-6;
 /// Cosine from which an effect that was set aside is listed with a direct error.
 const MIN_COSINE_LISTED: f64 = 0.9;
 
-/// The instances that are set aside, each with the direct ones that explain it.
+/// The instances that are set aside, and those that compete as equals, each with the direct ones that explain it.
 pub fn set_aside(
     stack: &Stack<'_>,
     signatures: &Library,
     normal: &Normal,
-) -> BTreeMap<usize, Vec<usize>> {
+) -> [BTreeMap<usize, Vec<usize>>; 2] {
+    let nothing = || [BTreeMap::new(), BTreeMap::new()];
     if !resolved::is_along_axes(stack) {
-        return BTreeMap::new();
+        return nothing();
     }
     let direct: Vec<usize> = (0..signatures.forms.len())
         .filter(|form| is_direct(signatures, *form))
         .collect();
     if direct.is_empty() {
-        return BTreeMap::new();
+        return nothing();
     }
     let any_form = any_form(stack);
     let columns: Vec<usize> = direct
         .iter()
         .flat_map(|form| signatures.forms[*form].columns.clone())
         .collect();
-    let mut aside = BTreeMap::new();
+    let [mut aside, mut shared] = nothing();
     for instance in 0..signatures.instances.len() {
         let own = |form: &usize| signatures.forms[*form].instance == instance;
         let forms: Vec<usize> = (0..signatures.forms.len()).filter(own).collect();
@@ -87,19 +89,19 @@ pub fn set_aside(
             };
             !plain.any(tells)
         };
-        if forms.iter().all(is_explained) && forms.iter().any(needs_more) {
+        if forms.iter().all(is_explained) {
             let alike = |one: &&usize| {
                 isolability::cos(signatures, normal, first, **one) > MIN_COSINE_LISTED
             };
             let by = direct.iter().filter(alike);
-            aside.insert(
-                instance,
-                by.map(|one| signatures.forms[*one].instance).collect(),
-            );
+            let by: Vec<usize> = by.map(|one| signatures.forms[*one].instance).collect();
+            let is_aside = forms.iter().any(needs_more);
+            let found = if is_aside { &mut aside } else { &mut shared };
+            found.insert(instance, by);
         }
     }
     aside.extend(wavelengths(stack, signatures));
-    aside
+    [aside, shared]
 }
 
 /// The error of a laser's wavelength, which is a scale of the axis where it reads one alone, whatever the noise: the instances of

@@ -144,7 +144,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     lines::add(stack, scope.slots, &mut signatures);
     widening::widen_curves(stack, &mut signatures);
     let mut normal = signatures.normal(&stack.z);
-    signatures.aside = aside::set_aside(stack, &signatures, &normal);
+    [signatures.aside, signatures.shared] = aside::set_aside(stack, &signatures, &normal);
     let mut best = search(scope, &signatures, &normal);
     let is_closed = !best.leftover.flagged();
     if !best.set.is_empty() && scope.config.applies(Rule::FreeShapes) {

@@ -91,6 +91,7 @@ mod tests {
         Library {
             curves: Default::default(),
             aside: Default::default(),
+            shared: Default::default(),
             instances: ["guide_bow", "backlash", "scale_error"]
                 .map(instance)
                 .to_vec(),

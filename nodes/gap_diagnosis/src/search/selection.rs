@@ -360,6 +360,7 @@ mod tests {
         Library {
             curves: Default::default(),
             aside: Default::default(),
+            shared: Default::default(),
             instances: vec![Instance {
                 kind: effects::kind("backlash").unwrap(),
                 target: Target::Axis(Axis::X),

@@ -169,6 +169,8 @@ pub struct Library {
     pub curves: BTreeSet<usize>,
     /// Instances that are not searched, each with those that explain it (`aside`).
     pub aside: BTreeMap<usize, Vec<usize>>,
+    /// Instances that are searched, each with those that would explain all of it.
+    pub shared: BTreeMap<usize, Vec<usize>>,
 }
 
 /// Most grid points of an instance.
@@ -186,6 +188,7 @@ impl Library {
             columns: vec![],
             curves: BTreeSet::new(),
             aside: BTreeMap::new(),
+            shared: BTreeMap::new(),
         };
         for instance in 0..signatures.instances.len() {
             for values in shapes(signatures.instances[instance].kind) {
@@ -274,11 +277,10 @@ impl Library {
         self.excited.iter().filter(|seen| **seen).count()
     }
 
-    /// Instances that were set aside for one that explains them.
+    /// Instances that one explains, whether they were set aside for it or not.
     pub fn set_aside_for(&self, instance: usize) -> impl Iterator<Item = usize> {
-        let aside = self.aside.iter();
-        aside
-            .filter(move |(_, by)| by.contains(&instance))
+        let all = self.aside.iter().chain(&self.shared);
+        all.filter(move |(_, by)| by.contains(&instance))
             .map(|(aside, _)| *aside)
     }
 
