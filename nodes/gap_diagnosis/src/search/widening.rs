@@ -119,9 +119,14 @@ const AT_TARGETS_ALONE: [&str; 4] = [
     "free_by_place6_um",
 ];
 
+/// An effect and how the names of its free amplitudes begin of which the same holds: on paths it is told by its feeds.
+const BY_FEED: (&str, &str) = ("feed_lost_motion", "free_by_place");
+
 /// Whether a free amplitude of an instance may be in its wide form.
 pub fn is_free_here(stack: &Stack<'_>, instance: &Instance, name: &str) -> bool {
-    !AT_TARGETS_ALONE.contains(&name) || axis_at_targets(stack, instance).is_some()
+    let is_by_feed = instance.kind.id == BY_FEED.0 && name.starts_with(BY_FEED.1);
+    let needs_targets = is_by_feed || AT_TARGETS_ALONE.contains(&name);
+    !needs_targets || axis_at_targets(stack, instance).is_some()
 }
 
 /// Adds the curve of any form to the pitch error of every axis that was read at targets only. Its plain curve may be
