@@ -128,7 +128,8 @@ impl Diagnose {
         let budget = self.budget.as_deref().map(Budget::open).transpose()?;
         let limits = self.limits.open()?;
         let diagnosed = beside(&self.bags, &self.simulated, &name, &text, &config)?;
-        let title = format!("Simulator against machine: {}", listed(&self.bags));
+        let machine = MachineFile::parse(&text, &name)?.name;
+        let title = format!("Simulator against machine: {machine}");
         let mut page = gap::page(&title, &diagnosed, self.explain)?;
         let mut between = None;
         for path in &self.bags {
@@ -136,7 +137,6 @@ impl Diagnose {
             page.add_conditions(&test_conditions::of(&seen, budget.as_ref(), None));
             between = joined(between, seen.nanos());
         }
-        let machine = MachineFile::parse(&text, &name)?.name;
         let first = Bag::open(&self.bags[0])?;
         page.screen.made = Some(Made::of(
             SOFTWARE,

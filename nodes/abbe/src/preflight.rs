@@ -158,11 +158,11 @@ impl Preflight {
         size::check(&plan.plan, &plan.programs, &plan.machine)?;
         let geometry = self.geometry(&plan, u_um * 1e-3)?;
         let page = self.foreseen(&plan)?;
-        let title = format!("Preflight of: {}", plan.plan.title);
+        let title = format!("Preflight: {}", plan.plan.title);
         if let Some(path) = &self.html {
             let sections = geometry.sections();
             let body = maud::html! {
-                h1 { (title) }
+                (page.screen.html(&title))
                 (page.body)
                 @for section in &sections { (section.html()) }
             };

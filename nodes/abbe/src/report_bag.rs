@@ -7,7 +7,7 @@ use reports::evaluate::limits::{Limits, state_traceability};
 use reports::evaluate::{BrokenOff, Tests};
 use reports::loss;
 use reports::machine_defaults;
-use reports::page::fold;
+use reports::page::fold_details;
 use reports::screen::{Made, Screen};
 use reports::section::Section;
 use reports::terminal::{self, Part, Rank, Room};
@@ -304,7 +304,7 @@ fn judged_page(
             @if let Some(line) = &defaults_line { p { (line) } }
             @for section in &ordered { (section.html()) }
             @if details.len() > MOST_DETAILS {
-                (fold(&format!("{} parts of detail", details.len()), None, false, &html! {
+                (fold_details(details.len(), &html! {
                     @for section in &details { (section.html()) }
                 }))
             } @else {

@@ -12,6 +12,8 @@ pub struct Shown {
     pub unit: String,
 }
 
+/// Uncertainties below this are written with a power of ten.
+const TINY: f64 = 1e-4;
 /// rad to seconds of arc.
 const RAD_ARCSEC: f64 = 648_000.0 / std::f64::consts::PI;
 
@@ -36,6 +38,7 @@ impl Shown {
     pub fn value(&self, value: f64, standard_uncertainty: Option<f64>) -> String {
         let value = value * self.factor;
         match standard_uncertainty.filter(|u| *u > 0.0) {
+            Some(u) if is_tiny(2.0 * u * self.factor) => format!("{value:.1e}"),
             Some(u) => section::rounded(value, 2.0 * u * self.factor).0,
             None => plain(value),
         }
@@ -44,6 +47,7 @@ impl Shown {
     /// An expanded uncertainty (k = 2) in it.
     pub fn expanded(&self, standard_uncertainty: Option<f64>) -> String {
         match standard_uncertainty.filter(|u| *u > 0.0) {
+            Some(u) if is_tiny(2.0 * u * self.factor) => format!("{:.1e}", 2.0 * u * self.factor),
             Some(u) => section::rounded(0.0, 2.0 * u * self.factor).1,
             None => "—".to_owned(),
         }
@@ -59,6 +63,11 @@ impl Shown {
             format!("{} {}", plain(value), self.unit)
         }
     }
+}
+
+/// Whether a number has more decimals than a table has room for.
+fn is_tiny(value: f64) -> bool {
+    value < TINY
 }
 
 /// Four digits.
@@ -113,6 +122,9 @@ mod tests {
         let rotary = shown(&series("iso230_2_rotary.figures.both.accuracy", "rad"));
         assert_eq!(rotary.value(5f64.to_radians() / 3600.0, None), "5.000");
         assert_eq!(shown(&series("geometry.EC0Y", "rad")).unit, "µrad");
+        let cubic = shown(&series("geometry.ECY3", ""));
+        assert_eq!(cubic.value(-8.99e-12, Some(4e-12)), "-9.0e-12");
+        assert_eq!(cubic.expanded(Some(4e-12)), "8.0e-12");
         assert_eq!(
             shown(&series("effect.backlash.width_um", "um")).value(6.0, None),
             "6.000"

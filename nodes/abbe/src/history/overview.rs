@@ -18,6 +18,11 @@ use super::view::{Line, Page, SCHEMA};
 /// Most figures of an overview: each is read.
 const MOST_FIGURES: usize = 2_000;
 
+/// Most names in a sentence.
+const MOST_NAMES: usize = 3;
+/// Begin of the names of coefficients, of which a geometric model has hundreds.
+const GEOMETRY: &str = "geometry.";
+
 /// The overview of a machine.
 ///
 /// # Errors
@@ -29,8 +34,8 @@ pub fn of(
     every_days: Option<f64>,
     window: Window,
 ) -> Result<Page> {
-    let mut figures = Section::new("Figures").ranked(Rank::Answer);
-    let (mut values, mut list, mut rows) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut values, mut list) = (Vec::new(), Vec::new());
+    let (mut rows, mut geometry, mut changing) = (Vec::new(), Vec::new(), Vec::new());
     for series in chosen(store, key)? {
         let kept = store.points(series.id, window)?;
         let points: Vec<Point> = kept.iter().map(|one| one.point).collect();
@@ -38,7 +43,16 @@ pub fn of(
             continue;
         };
         let (row, entry) = last_value(&series, &points, last.point);
-        rows.push(row);
+        if entry["significant"] == true {
+            changing.push(title(&series));
+        }
+        let is_geometry = series.name.starts_with(GEOMETRY);
+        if is_geometry {
+            &mut geometry
+        } else {
+            &mut rows
+        }
+        .push(row);
         list.push(entry);
         values.push(Line {
             series,
@@ -47,7 +61,43 @@ pub fn of(
             source: last.source,
         });
     }
-    figures.tables.push(Rows {
+    let mut figures = Section::new("Figures").ranked(Rank::Answer);
+    if !values.is_empty() {
+        figures.answers.push(in_short(values.len(), &changing));
+    }
+    figures.tables.push(table(rows));
+    let mut places = Section::new("Coefficients and places of geometric errors");
+    places.answers.push(format!("{} figures.", geometry.len()));
+    let has_places = !geometry.is_empty();
+    places.tables.push(table(geometry));
+    let (tests, due_list) = due_tests(store, machine, every_days)?;
+    Ok(Page {
+        title: format!("History of {machine}"),
+        sections: std::iter::once(figures)
+            .chain(has_places.then_some(places))
+            .chain([tests])
+            .collect(),
+        values,
+        json: json!({ "schema": SCHEMA, "machine": machine, "figures": list, "due": due_list }),
+    })
+}
+
+/// Which figures change, in one sentence.
+fn in_short(n: usize, changing: &[String]) -> String {
+    let names = changing.iter().take(MOST_NAMES).cloned();
+    let names = names.collect::<Vec<_>>().join("; ");
+    match changing.len() {
+        0 => format!("none of {n} changes significantly over the kept tests."),
+        k if k > MOST_NAMES => format!(
+            "{k} of {n} change significantly: {names}; and {} more.",
+            k - MOST_NAMES
+        ),
+        k => format!("{k} of {n} change significantly: {names}."),
+    }
+}
+
+fn table(rows: Vec<Vec<String>>) -> Rows {
+    Rows {
         head: head(&[
             "figure",
             "values",
@@ -58,14 +108,7 @@ pub fn of(
         ]),
         rows,
         note: "*: significant. --figure or --effect shows changes, limits and the plot.".to_owned(),
-    });
-    let (tests, due_list) = due_tests(store, machine, every_days)?;
-    Ok(Page {
-        title: format!("History of {machine}"),
-        sections: vec![figures, tests],
-        values,
-        json: json!({ "schema": SCHEMA, "machine": machine, "figures": list, "due": due_list }),
-    })
+    }
 }
 
 /// A figure in the overview: its row, and for machines.
@@ -135,7 +178,11 @@ fn due_tests(
     let rank = |due: &Due| due.due_s.unwrap_or(f64::INFINITY);
     all.sort_by(|(_, a), (_, b)| rank(a).total_cmp(&rank(b)));
     let is_due = |due: &Due| due.due_s.is_some_and(|due_s| due_s <= now_s);
-    let mut section = Section::new("Tests").ranked(Rank::Answer);
+    let mut section = Section::new("Tests");
+    let n_due = all.iter().filter(|(_, due)| is_due(due)).count();
+    section
+        .answers
+        .push(format!("{n_due} of {} are due.", all.len()));
     let row = |(test, due): &(String, Due)| {
         let dash = || "—".to_owned();
         vec![

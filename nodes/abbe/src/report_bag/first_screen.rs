@@ -8,7 +8,7 @@ use reports::evaluate::limits::CONFORMS;
 use reports::loss;
 use reports::page::figure;
 use reports::screen::{Screen, Tile, Tone};
-use reports::section::Section;
+use reports::section::{Section, capitalised};
 use reports::terminal::Rank;
 
 /// What a verdict without limits says.
@@ -32,13 +32,17 @@ pub(super) fn of(
         all.sort_by_key(|one| one.rank);
         all
     };
-    let shown = worst_of_circles(answered());
+    let mut shown = worst_of_kind(answered());
+    if shown.iter().any(|one| !one.figures["iso230_6"].is_null()) {
+        // The space diagonals together have the figures of each.
+        shown.retain(|one| !one.title.starts_with("Diagonal "));
+    }
     let tiles = { shown.iter() }
         .take(MOST_ANSWERS_ON_TILES)
         .map(|one| tile(one));
     let tiles = tiles.collect();
     Screen {
-        verdict: verdict(tests, &shown, judged),
+        verdict: verdict(tests, (&shown, sections), judged),
         tiles,
         lacks: lacks(tests, sections, stated),
         picture: picture(&shown, sections),
@@ -46,17 +50,15 @@ pub(super) fn of(
     }
 }
 
-/// The parts without the circles that another of their plane exceeds, each worst circle followed by the causes of its plane.
-fn worst_of_circles(answered: Vec<&Section>) -> Vec<&Section> {
+/// The parts without the circles and drifts that another of their plane or axis exceeds, each worst circle followed by the
+/// causes of its plane.
+fn worst_of_kind(answered: Vec<&Section>) -> Vec<&Section> {
     let is_worst = |one: &&Section| {
-        let Some(own) = circular_error_mm(one) else {
+        let Some(own) = size_mm(one) else {
             return true;
         };
-        let is_rival = |other: &&&Section| plane_of(other) == plane_of(one);
-        let mut rivals = { answered.iter() }
-            .filter(is_rival)
-            .filter_map(|other| circular_error_mm(other));
-        rivals.all(|other| other <= own)
+        let mut rivals = rivals(one, answered.iter().copied());
+        rivals.all(|other| size_mm(other) <= Some(own))
     };
     let mut shown: Vec<&Section> = answered.iter().copied().filter(is_worst).collect();
     // A stable sort: the part of the causes moves behind the circles alone.
@@ -64,17 +66,31 @@ fn worst_of_circles(answered: Vec<&Section>) -> Vec<&Section> {
     shown
 }
 
+/// Parts of the same plane or axis with a size, itself among them.
+fn rivals<'s>(
+    one: &Section,
+    all: impl Iterator<Item = &'s Section>,
+) -> impl Iterator<Item = &'s Section> {
+    all.filter(|other| kind_of(other) == kind_of(one) && size_mm(other).is_some())
+}
+
 fn is_of_circles(section: &Section) -> bool {
     !section.figures["iso230_4"].is_null() || !section.figures["breakdown"].is_null()
 }
 
-/// Such as `Circle XY` with its state of compensation.
-fn plane_of(section: &Section) -> (&str, &str) {
+/// Such as `Circle XY` with its state of compensation, or `Thermal drift of Z` with its cause.
+fn kind_of(section: &Section) -> (&str, &str) {
     let (title, state) = section
         .title
         .split_once(": ")
         .unwrap_or((section.title.as_str(), ""));
     (title.split(',').next().unwrap_or(title), state)
+}
+
+/// By what a circle or a drift is worse than another, mm.
+fn size_mm(section: &Section) -> Option<f64> {
+    let range_mm = section.figures["iso230_3_log"]["figures"]["range"]["value_mm"].as_f64();
+    circular_error_mm(section).or(range_mm)
 }
 
 /// The greatest circular error of a circle's part, mm.
@@ -112,18 +128,48 @@ fn tile(section: &Section) -> Tile {
         return tile.clone();
     }
     let answer = section.answers.first().map_or("", String::as_str);
-    let answer = answer.trim_end_matches('.');
+    let (reservation, answer) = apart(answer.trim_end_matches('.'));
     let (value, more) = answer.split_once(&[',', ';'][..]).unwrap_or((answer, ""));
-    let more = more.trim_start();
-    let title = section.title.split(':').next().unwrap_or_default();
-    let is_compensated = section.title.contains(": compensated");
-    let state = if is_compensated { ", compensated" } else { "" };
-    let title = &(without_place(title) + state);
+    let more = [more.trim_start(), reservation];
+    let more = more.into_iter().filter(|text| !text.is_empty());
+    let more = more.collect::<Vec<_>>().join("; ");
+    let title = &short_title(section);
     match figure_of(value) {
         Some((name, figure)) if more.is_empty() => Tile::new(title, figure, name),
         Some((name, figure)) => Tile::new(title, figure, format!("{name}; {more}")),
-        None => Tile::new(title, value, more),
+        None => match number_of(answer) {
+            Some(figure) => Tile::new(title, figure, answer),
+            None => Tile::new(title, value, more),
+        },
     }
+}
+
+/// A title without place, cause and instrument.
+fn short_title(section: &Section) -> String {
+    let title = section.title.split(':').next().unwrap_or_default();
+    let is_compensated = section.title.contains(": compensated");
+    let state = if is_compensated { ", compensated" } else { "" };
+    without_place(title) + state
+}
+
+/// What an answer reserves before its figures, such as `as measured, not at 20 °C`, and the rest.
+fn apart(answer: &str) -> (&str, &str) {
+    match answer.split_once(": ") {
+        Some((before, rest)) if before.contains("not ") => (before, rest),
+        _ => ("", answer),
+    }
+}
+
+/// Units of a number that a tile shows alone.
+const TILE_UNITS: [&str; 6] = ["µm", "mm", "µrad", "arcsec", "ms", "K"];
+
+/// The first number with a unit in a sentence, such as `39.71 µm`.
+fn number_of(sentence: &str) -> Option<String> {
+    let words: Vec<&str> = sentence.split([' ', ';', ',']).collect();
+    let is_number = |word: &str| word.parse::<f64>().is_ok();
+    let pair =
+        { words.windows(2) }.find(|pair| is_number(pair[0]) && TILE_UNITS.contains(&pair[1]))?;
+    Some(pair.join(" "))
 }
 
 /// A title without the place of a circle, which a tile has no room for.
@@ -151,7 +197,7 @@ fn figure_of(value: &str) -> Option<(String, String)> {
 
 fn verdict(
     tests: &Tests,
-    answered: &[&Section],
+    (answered, sections): (&[&Section], &[Section]),
     judged: Option<&Section>,
 ) -> Option<(String, Tone)> {
     if !tests.reading.is_whole() {
@@ -167,10 +213,22 @@ fn verdict(
         let mut decisions = rows.iter().filter_map(|row| row.get(4));
         let all_pass = decisions.all(|decision| decision == CONFORMS);
         let tone = if all_pass { Tone::Good } else { Tone::Bad };
-        return Some((answer, tone));
+        return Some((capitalised(&answer), tone));
     }
     let first = answered.first()?;
-    let answer = first.answers.first()?.trim_end_matches('.');
+    let (reservation, answer) = apart(first.answers.first()?.trim_end_matches('.'));
+    let reservation = match reservation {
+        "" => String::new(),
+        text => format!(" ({text})"),
+    };
+    let n_rivals = match size_mm(first) {
+        Some(_) => rivals(first, sections.iter()).count(),
+        None => 1,
+    };
+    let worst = match n_rivals {
+        1 => String::new(),
+        n => format!("; the greatest of {n}"),
+    };
     let causes = answered
         .iter()
         .filter(|one| !one.figures["breakdown"].is_null());
@@ -180,18 +238,31 @@ fn verdict(
         format!("; {}: {}", tile.name, tile.value)
     });
     let title = without_place(first.title.trim_end_matches(": not compensated"));
+    let title = title
+        .replace(": not compensated, ", ", ")
+        .replace(": ", ", ");
+    let answer = uncapitalised(answer);
     Some((
-        format!("{title}: {answer}{cause}. {NOT_JUDGED}"),
+        format!("{title}: {answer}{worst}{cause}{reservation}. {NOT_JUDGED}"),
         Tone::Plain,
     ))
 }
 
+/// A sentence behind a colon: its first word, where it is one, without a capital.
+fn uncapitalised(sentence: &str) -> String {
+    let mut letters = sentence.chars();
+    match (letters.next(), letters.next()) {
+        (Some(first), Some(second)) if second.is_lowercase() => first
+            .to_lowercase()
+            .chain(sentence.chars().skip(1))
+            .collect(),
+        _ => sentence.to_owned(),
+    }
+}
+
 fn lacks(tests: &Tests, sections: &[Section], stated: bool) -> Vec<String> {
     let mut lacks: Vec<String> = tests.broken_off.iter().map(as_text).collect();
-    for section in sections {
-        let warnings = section.warnings.iter();
-        lacks.extend(warnings.map(|warning| format!("{}: {}", section.title, warning.line)));
-    }
+    lacks.extend(warnings(sections));
     if sections.is_empty() {
         lacks.push("The bag holds no test that can be evaluated.".to_owned());
     } else if !stated {
@@ -201,6 +272,27 @@ fn lacks(tests: &Tests, sections: &[Section], stated: bool) -> Vec<String> {
         );
     }
     lacks
+}
+
+/// Warnings with the tests that they are of, each sentence once.
+fn warnings(sections: &[Section]) -> Vec<String> {
+    let mut all: Vec<(&str, Vec<String>)> = Vec::new();
+    for section in sections {
+        for warning in &section.warnings {
+            let title = short_title(section);
+            match all.iter_mut().find(|(line, _)| *line == warning.line) {
+                Some((_, titles)) => titles.push(title),
+                None => all.push((&warning.line, vec![title])),
+            }
+        }
+    }
+    let in_words = |(line, titles): (&str, Vec<String>)| match titles.as_slice() {
+        [first, others @ ..] if !others.is_empty() => {
+            format!("{first} and {} more: {line}", others.len())
+        }
+        _ => format!("{}: {line}", titles.concat()),
+    };
+    all.into_iter().map(in_words).collect()
 }
 
 fn as_text(one: &impl Display) -> String {
@@ -240,7 +332,7 @@ mod tests {
         let (verdict, tone) = screen.verdict.clone().unwrap();
         assert_eq!(
             verdict,
-            "Space diagonals: Systematic deviation E_d 12.00 µm. Not judged: no limits were given."
+            "Space diagonals: systematic deviation E_d 12.00 µm. Not judged: no limits were given."
         );
         assert_eq!(tone, Tone::Plain);
         assert_eq!(screen.tiles[1].name, "Positioning X, run 1 on");
@@ -289,7 +381,7 @@ mod tests {
         let screen = of(&Tests::default(), &all, None, true);
         assert_eq!(
             screen.verdict.unwrap().0,
-            "Circle XY, R 50.000 mm, 6000 mm/min, runs 9 and 10: circular error G of both senses 13.20 µm; largest cause in XY: backlash X 5.0 ± 0.2 µm. Not judged: no limits were given."
+            "Circle XY, R 50.000 mm, 6000 mm/min, runs 9 and 10: circular error G of both senses 13.20 µm; the greatest of 2; largest cause in XY: backlash X 5.0 ± 0.2 µm. Not judged: no limits were given."
         );
         let names: Vec<&str> = screen.tiles.iter().map(|tile| tile.name.as_str()).collect();
         assert_eq!(
@@ -320,6 +412,73 @@ mod tests {
             let wanted = (!name.is_empty()).then(|| (name.to_owned(), figure.to_owned()));
             assert_eq!(figure_of(value), wanted, "{value:?}");
         }
+    }
+
+    #[test]
+    fn a_tile_shows_a_number_and_no_sentence() {
+        let shown = |title: &str, answer: &str| {
+            let one = tile(&section(title, answer, Rank::Table));
+            (one.value, one.more)
+        };
+        let positioning = shown(
+            "Positioning X, run 1 on: not compensated, by the length reference",
+            "as measured, not at 20 °C: accuracy A 127.39 µm, systematic deviation E 121.89 µm.",
+        );
+        assert_eq!(positioning.0, "127.39 µm");
+        assert_eq!(
+            positioning.1,
+            "accuracy A; systematic deviation E 121.89 µm; as measured, not at 20 °C"
+        );
+        let widest = "Widest corner of run 18: 39.41 µm between the greatest deviations.";
+        assert_eq!(shown("Lines", widest).0, "39.41 µm");
+        let tables = "X: scale and motor are up to 39.71 µm apart; up minus down -4.24 µm.";
+        let (value, more) = shown("Positioning tables", tables);
+        assert_eq!(value, "39.71 µm");
+        assert!(more.starts_with("X: scale and motor"), "{more}");
+        assert_eq!(
+            shown("t", "4 of 51 coefficients are known.").0,
+            "4 of 51 coefficients are known"
+        );
+    }
+
+    #[test]
+    fn a_verdict_has_one_colon_before_its_figures() {
+        let one = section(
+            "Positioning X, run 1 on: not compensated, by the length reference",
+            "as measured, not at 20 °C: accuracy A 127.39 µm.",
+            Rank::Table,
+        );
+        assert_eq!(
+            of(&Tests::default(), &[one], None, true).verdict.unwrap().0,
+            "Positioning X, run 1 on, by the length reference: accuracy A 127.39 µm (as measured, not at 20 °C). Not judged: no limits were given."
+        );
+    }
+
+    #[test]
+    fn the_greatest_of_several_drifts_is_the_verdict_and_like_warnings_are_one() {
+        let drift = |run: u32, range_mm: f64| {
+            let title = format!("Thermal drift of Z, run {run}, ISO 230-3: cause not stated");
+            let mut one = section(
+                &title,
+                &format!("range {:.2} µm.", range_mm * 1e3),
+                Rank::Table,
+            );
+            one.figures =
+                serde_json::json!({"iso230_3_log": {"figures": {"range": {"value_mm": range_mm}}}});
+            one.warn("Recorded too briefly", "Recorded for 1.00 h.".to_owned());
+            one
+        };
+        let all = [drift(1, 0.0237), drift(2, 0.0242), drift(3, 0.0232)];
+        let screen = of(&Tests::default(), &all, None, true);
+        assert_eq!(
+            screen.verdict.unwrap().0,
+            "Thermal drift of Z, run 2, ISO 230-3, cause not stated: range 24.20 µm; the greatest of 3. Not judged: no limits were given."
+        );
+        assert_eq!(screen.tiles.len(), 1);
+        assert_eq!(
+            screen.lacks,
+            ["Thermal drift of Z, run 1, ISO 230-3 and 2 more: Recorded for 1.00 h."]
+        );
     }
 
     #[test]

@@ -21,6 +21,8 @@ pub struct Bar {
 const BARS_WIDTH: f64 = 560.0;
 /// Height of a bar with its name, px.
 const BAR_ROW_PX: f64 = 46.0;
+/// Most letters of a name in the usual size on a phone.
+const MOST_LETTERS: usize = 44;
 /// Left and right end of the bars, px.
 const BAR_LENGTH_PX: [f64; 2] = [6.0, 536.0];
 
@@ -62,7 +64,12 @@ fn draw(text: &mut String, axis: &str, bars: &[Bar]) -> std::fmt::Result {
         let width = (scale.px(bar.size) - BAR_LENGTH_PX[0]).max(1.5);
         write!(
             text,
-            "<text class=\"ring\" x=\"{}\" y=\"{:.1}\">{}</text><g class=\"c0\"><rect x=\"{}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"14\" fill=\"currentColor\" fill-opacity=\"{opacity}\"/></g>",
+            "<text class=\"ring{}\" x=\"{}\" y=\"{:.1}\">{}</text><g class=\"c0\"><rect x=\"{}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"14\" fill=\"currentColor\" fill-opacity=\"{opacity}\"/></g>",
+            if bar.name.chars().count() > MOST_LETTERS {
+                " long"
+            } else {
+                ""
+            },
             BAR_LENGTH_PX[0],
             top + 20.0,
             escaped(&bar.name),
@@ -89,6 +96,12 @@ mod tests {
         assert!(text.contains("width=\"530.0\" height=\"14\""), "{text}");
         assert!(text.contains("width=\"132.5\""), "{text}");
         assert!(text.contains("fill-opacity=\"0.35\""));
+        assert!(!text.contains("ring long"), "{text}");
+        let long = Bar {
+            name: "reversal spike X at 6000 mm/min, R 50 mm 3.42 ± 0.43 µm".to_owned(),
+            ..bar(1.0, true)
+        };
+        assert!(svg("span / µm", &[long]).contains("class=\"ring long\""));
         assert!(text.contains("cause &lt;4&gt;") && text.contains("span / µm"));
     }
 }

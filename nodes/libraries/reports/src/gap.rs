@@ -29,6 +29,11 @@ mod waterfall;
 mod why;
 mod words;
 
+const CAUSES: &str = "Causes";
+const HELD_OUT: &str = "Runs before and after";
+const NEXT: &str = "What to measure next";
+const GAP: &str = "Gap and noise floor";
+const NOT_EXCITED: &str = "Effects that this recording could not show";
 /// Begin of the names of amplitudes that only widen an effect's form.
 const FREE_FORM: &str = "free_";
 /// How the sum of a size and its shares begins.
@@ -71,15 +76,69 @@ pub fn page(title: &str, diagnosed: &Diagnosed, explain: bool) -> Result<Report>
         body: html! {
             (heat::style())
             @for line in &lines { p { (line) } }
-            @for section in sections.iter().filter(|one| one.rank < Rank::Detail) { (section.html()) }
+            @for section in sections.iter().filter(|one| one.rank < Rank::Detail) { (on_page(section, diagnosed)) }
             (fold("Machine minus simulator, before and after", None, true, &compared))
             (why::folded(report))
             (heat::heat(&figures.heat))
-            @for section in sections.iter().filter(|one| one.rank == Rank::Detail) { (section.html()) }
+            @for section in sections.iter().filter(|one| one.rank == Rank::Detail) { (on_page(section, diagnosed)) }
             @if let Some(section) = &look_alikes { (section.html()) }
         },
         figures: diagnosed.json()?,
         lines,
+    })
+}
+
+/// A part with its answer beside the title, which a page shows while the part is folded.
+fn on_page(section: &Section, diagnosed: &Diagnosed) -> maud::Markup {
+    let answers = answer(&section.title, diagnosed).into_iter().collect();
+    let own = Section {
+        answers,
+        ..section.clone()
+    };
+    own.html()
+}
+
+fn answer(title: &str, diagnosed: &Diagnosed) -> Option<String> {
+    let report = &diagnosed.diagnosis.report;
+    let figures = &diagnosed.diagnosis.figures;
+    Some(match title {
+        CAUSES => {
+            let is_open = |cause: &&Cause| cause.status == Status::Surrogate;
+            let n_open = report.causes.iter().filter(is_open).count();
+            let n_named = report.causes.len() - n_open;
+            match n_open {
+                0 => format!("{n_named} named."),
+                n => format!("{n_named} named; {n} fail a check."),
+            }
+        }
+        HELD_OUT => {
+            let runs = figures.held_out.iter();
+            let most = runs.max_by(|a, b| a.after_um.total_cmp(&b.after_um))?;
+            format!(
+                "Most is left in run {}, {}: {} to {} µm rms.",
+                most.run,
+                most.title,
+                three(most.before_um),
+                three(most.after_um)
+            )
+        }
+        NEXT => {
+            let first = report.next_experiments.first()?;
+            format!("{}, {:.0} min.", first.run, first.minutes.ceil())
+        }
+        GAP => {
+            let channels = &report.gap.per_channel;
+            let n_above = channels.iter().filter(|one| one.above_floor).count();
+            format!(
+                "{n_above} of {} channels are above the floor.",
+                channels.len()
+            )
+        }
+        NOT_EXCITED => match report.not_excited.len() {
+            1 => "1 effect.".to_owned(),
+            n => format!("{n} effects."),
+        },
+        _ => return None,
     })
 }
 
@@ -204,7 +263,7 @@ fn causes(report: &GapReport) -> Section {
         "could be instead",
     ];
     let mut section = section(
-        "Causes",
+        CAUSES,
         &names,
         rows.collect(),
         "D: size over noise, whitened. Below 6.5 nothing is named; in blind trials with other physics nine of ten above 20 are.",
@@ -412,7 +471,7 @@ fn gap(report: &GapReport) -> Section {
         "reproduced",
     ];
     section(
-        "Gap and noise floor",
+        GAP,
         &names,
         rows.collect(),
         "Above it: by more than noise and the error of form that every simulator is taken to have (0.2 µm). Rotary axes in mrad, thermometers in mK.",
@@ -431,7 +490,7 @@ fn held_out(diagnosed: &Diagnosed) -> Section {
     });
     let names = ["run", "before µm", "after µm", "floor µm"];
     let mut section = section(
-        "Runs before and after",
+        HELD_OUT,
         &names,
         runs.collect(),
         "Root mean square of machine minus simulator, set-up floated.",
@@ -469,7 +528,10 @@ fn held_out(diagnosed: &Diagnosed) -> Section {
 /// What an experiment separates, in words.
 fn separated(next: &NextExperiment) -> String {
     let names: Vec<String> = next.separates.iter().map(|id| name_of(id)).collect();
-    names.join(" / ")
+    match names.as_slice() {
+        [one, other] => format!("{one} from {other}"),
+        _ => names.join(", "),
+    }
 }
 
 fn next(report: &GapReport) -> Section {
@@ -482,7 +544,7 @@ fn next(report: &GapReport) -> Section {
         ]
     });
     section(
-        "What to measure next",
+        NEXT,
         &["run", "separates", "squared distance", "minutes"],
         rows.collect(),
         "A squared distance of 9 or more is a decision. There and back: both ways in one run, with one zero.",
@@ -494,10 +556,5 @@ fn not_excited(report: &GapReport) -> Section {
         let kind = name(&effect.effect, "");
         vec![kind, effect.needs.clone()]
     });
-    section(
-        "Effects that this recording could not show",
-        &["effect", "needs"],
-        rows.collect(),
-        "",
-    )
+    section(NOT_EXCITED, &["effect", "needs"], rows.collect(), "")
 }

@@ -116,11 +116,10 @@ fn touches(evidence: &Evidence) -> Vec<(&ProbedPoint, f64)> {
 }
 
 /// What of a latency is the control's own, and what repeated touches do to the rest.
-const TICKS_SHARE: &str = "A control that polls its probe input sees a touch up to one servo period late, half of one on \
-    average. That half is part of the latency above, rightly, since every touch waits so; what is left is between \
-    none and one period for a single touch, with a standard deviation of a period over the square root of 12, and \
-    the mean of n touches in spread phases of the period is better by the square root of n. A control that latches \
-    in hardware has no such share.";
+const TICKS_SHARE: &str = "A control that polls its probe input sees a touch up to one servo period late, on average half a \
+    period. The latency above includes that half. The rest scatters between single touches, with a standard deviation of a \
+    period over the square root of 12. The mean of n touches scatters less by the square root of n. A control that latches \
+    the probe in hardware has no such scatter.";
 
 /// Table and plot.
 ///

@@ -24,9 +24,9 @@ figure { margin: .8rem 0; break-inside: avoid; } .legend { display: flex; flex-w
 .tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 10.5rem), 1fr)); gap: .6rem; margin: .8rem 0; } .tile { border: 1px solid var(--rule); border-radius: .4rem; padding: .5rem .7rem; min-width: 0; break-inside: avoid; }
 .tile b { display: block; font-size: 1.3rem; line-height: 1.25; overflow-wrap: anywhere; } .tile .name { color: var(--soft); font-size: .85rem; } .tile .more { font-size: .85rem; }
 .part { border-top: 1px solid var(--rule); } .part > summary, .part > .summary { padding: .45rem 0; } summary { cursor: pointer; } .part > summary h2, .summary h2 { display: inline; margin: 0; } .answer { display: block; color: var(--soft); font-size: .95rem; padding-left: 1.1rem; } .figures > summary, .figures > .summary { color: var(--soft); }
-@media (max-width: 40rem) { h1 { font-size: 1.25rem; } .verdict { font-size: 1.1rem; } .tiles { grid-template-columns: 1fr 1fr; } .tile b { font-size: 1.1rem; } .plot text { font-size: 26px; } .polar text { font-size: 20px; } .plot .ring { font-size: 18px; } .bars text, .bars .ring, .look_alikes text { font-size: 20px; } .three .plot text { font-size: 17px; } table { font-size: .85rem; } th, td { padding-right: .6rem; }
+@media (max-width: 40rem) { h1 { font-size: 1.25rem; } .verdict { font-size: 1.1rem; } .tiles { grid-template-columns: 1fr 1fr; } .tile b { font-size: 1.1rem; } .plot text { font-size: 26px; } .polar text { font-size: 20px; } .plot .ring { font-size: 18px; } .bars text, .bars .ring, .look_alikes text { font-size: 20px; } .bars .ring.long { font-size: 16px; } .three .plot text { font-size: 17px; } table { font-size: .85rem; } th, td { padding-right: .6rem; }
   th:first-child, td:first-child { position: sticky; left: 0; background: var(--paper); min-width: 6.5rem; max-width: 9rem; white-space: normal; } }
-th, td { vertical-align: top; } code { font-size: .9em; } @media print { html { font-size: 11px; } .three { grid-template-columns: 1fr 1fr 1fr; } .pair { grid-template-columns: 1fr 1fr; } body { max-width: none; font-size: 1rem; padding: 0; } table { font-size: 9px; overflow: visible; } th, td { white-space: normal; } h2, h3, summary, .summary, .legend { break-after: avoid; } .summary { break-inside: avoid; } .plot, tr { break-inside: avoid; } thead { display: table-header-group; } .plot { max-height: 9cm; } .polar { max-height: 11cm; } details::details-content { content-visibility: visible; display: block; block-size: auto; } .tiles { grid-template-columns: repeat(5, 1fr); } }
+.on-paper { display: none; } th, td { vertical-align: top; } code { font-size: .9em; } @media print { html { font-size: 11px; } .three { grid-template-columns: 1fr 1fr 1fr; } .pair { grid-template-columns: 1fr 1fr; } body { max-width: none; font-size: 1rem; padding: 0; } table { font-size: 9px; overflow: visible; } th, td { white-space: normal; } h2, h3, summary, .summary, .legend { break-after: avoid; } .summary { break-inside: avoid; } .plot, tr { break-inside: avoid; } thead { display: table-header-group; } .plot { max-height: 7.5cm; } .polar { max-height: 10cm; } .look_alikes { max-height: 22cm; } .three .plot { max-height: 6cm; } details::details-content { content-visibility: visible; display: block; block-size: auto; } .tiles { grid-template-columns: repeat(auto-fit, minmax(3cm, 1fr)); } .detail > .content { display: none; } .detail > .on-paper { display: block; } }
 ";
 
 /// Puts `body` on a page.
@@ -100,6 +100,17 @@ pub fn fold(title: &str, answer: Option<&str>, is_open: bool, content: &Markup) 
                 @if let Some(answer) = answer { span.answer { (answer) } }
             }
             (content)
+        }
+    }
+}
+
+/// Many parts of detail behind one title. On paper the title stands alone: hundreds of tables make no certificate.
+pub fn fold_details(n: usize, content: &Markup) -> Markup {
+    html! {
+        details.part.detail {
+            summary { h2 { (n) " parts of detail" } }
+            div.content { (content) }
+            p.note.on-paper { "These parts stand in the HTML page." }
         }
     }
 }

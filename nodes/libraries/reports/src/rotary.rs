@@ -11,7 +11,6 @@ use super::page::{figure, fold, table};
 use super::plot::{self, Plot, Trace};
 use super::screen::{Screen, Tile, Tone, compensated};
 use super::section::{Rows, head, rounded};
-use super::svg::unsigned_zero;
 use super::terminal::Part;
 use super::tool_error::quantile;
 use super::{Report, conditions, latency, pointed};
@@ -222,10 +221,7 @@ fn location_rows(model: &GeometryModel) -> Vec<Vec<String>> {
                 .copied()
                 .unwrap_or(f64::NAN);
             let (value, expanded) = if seen {
-                (
-                    unsigned_zero(format!("{:.2}", curve.coefficient[0] * scale)),
-                    format!("{:.2}", COVERAGE * u * scale),
-                )
+                rounded(curve.coefficient[0] * scale, COVERAGE * u * scale)
             } else {
                 ("not estimable".to_owned(), "—".to_owned())
             };

@@ -15,7 +15,7 @@ use crate::section::capitalised;
 /// Most tiles.
 const MOST_TILES: usize = 5;
 /// Most letters of a tile's remark; the whole stands below.
-const MOST_LETTERS: usize = 150;
+const MOST_LETTERS: usize = 200;
 /// Digits of a commit that people compare.
 const COMMIT_DIGITS: usize = 10;
 /// A time before 1971 is that of a table whose begin nobody stated, s since 1970.

@@ -101,9 +101,7 @@ pub fn section(
     let greatest = um(greatest_mm.unwrap_or(plane.worst_circularity_mm));
     let ranked = beyond(plane);
     section.answer(answer(plane, &ranked, &greatest));
-    section.tile = ranked
-        .first()
-        .map(|row| tile(row, &ranked, [u, v], &greatest));
+    section.tile = Some(tile(&ranked, [u, v], &greatest));
     section.drawings.extend(drawing(plane));
     let (lines, scale_at_20_degc) = expansion.state(plane);
     section.lines.extend(lines);
@@ -186,7 +184,12 @@ fn sized(row: &Row) -> String {
 }
 
 /// The largest cause on the first screen.
-fn tile(row: &Row, ranked: &[&Row], [u, v]: [Axis; 2], greatest: &str) -> Tile {
+fn tile(ranked: &[&Row], [u, v]: [Axis; 2], greatest: &str) -> Tile {
+    let name = format!("largest cause in {u}{v}");
+    let Some(row) = ranked.first() else {
+        let more = format!("no cause is beyond chance and its U; G of a sense {greatest} µm");
+        return Tile::new(&name, "none beyond U", more);
+    };
     let next = ranked.get(1).map_or_else(String::new, |next| {
         format!("; next {}, {} µm", next.name, um(next.peak_to_peak_mm))
     });
@@ -194,7 +197,7 @@ fn tile(row: &Row, ranked: &[&Row], [u, v]: [Axis; 2], greatest: &str) -> Tile {
         "makes {} µm alone, G is {greatest} µm{next}",
         um(row.peak_to_peak_mm)
     );
-    Tile::new(&format!("largest cause in {u}{v}"), sized(row), more)
+    Tile::new(&name, sized(row), more)
 }
 
 /// The causes by what each makes alone; `None` without any.

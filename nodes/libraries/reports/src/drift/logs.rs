@@ -52,9 +52,9 @@ pub(super) fn section(
         Ok(found) => {
             let cells = found.cells(budget.is_some());
             let [after_1_h, after_3_h, range, _] = &cells;
-            section.answers.push(format!(
-                "range {range} µm; {after_1_h} µm after an hour, {after_3_h} µm after three."
-            ));
+            section
+                .answers
+                .push(in_short(range, [after_1_h, after_3_h], &found));
             section.tables.push(table(log, &cells, (budget, mandrel)));
             section
                 .lines
@@ -85,6 +85,17 @@ pub(super) fn section(
         },
     });
     Ok(section)
+}
+
+/// Range and drift in one sentence, without what was not recorded.
+fn in_short(range: &str, [after_1_h, after_3_h]: [&String; 2], found: &Figures) -> String {
+    match (found.after_1_h.is_some(), found.after_3_h.is_some()) {
+        (false, _) => format!("range {range} µm."),
+        (true, false) => format!("range {range} µm; {after_1_h} µm after an hour."),
+        (true, true) => {
+            format!("range {range} µm; {after_1_h} µm after an hour, {after_3_h} µm after three.")
+        }
+    }
 }
 
 /// How much was recorded, and what nobody stated about it.

@@ -12,6 +12,7 @@
 //! A figure is named as `abbe report --json` has it below each test. Every test that has it is judged, but those that cannot
 //! be: lengths that are not those at 20 °C, and what the machine's own scale read.
 
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -206,25 +207,36 @@ fn one_sided_line(name: &str, key: &str) -> String {
     )
 }
 
-/// The decisions of a table of figures in one sentence; each figure that does not conform is named.
+/// The decisions of a table of figures in one sentence, failures first; each figure that does not conform is named.
 fn in_short(rows: &[Vec<String>]) -> String {
-    let mut by_decision: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    let mut by_decision: BTreeMap<(bool, Reverse<&str>), BTreeMap<&str, Vec<String>>> =
+        BTreeMap::new();
     for row in rows {
         if let [figure, test, _, _, decision, ..] = row.as_slice() {
-            let named = by_decision.entry(decision).or_default();
-            named.push(format!("{figure} of {test}"));
+            let key = (decision.starts_with(CONFORMS), Reverse(decision.as_str()));
+            let of_decision = by_decision.entry(key).or_default();
+            let test = test.split(": ").next().unwrap_or(test);
+            of_decision.entry(test).or_default().push(in_words(figure));
         }
     }
-    let counts = by_decision.iter().map(|(decision, figures)| {
-        let n = figures.len();
-        if *decision == CONFORMS {
-            format!("{decision}: {n}")
-        } else {
-            format!("{decision}: {n} ({})", figures.join("; "))
+    let counts = by_decision.iter().map(|((_, decision), tests)| {
+        let n: usize = tests.values().map(Vec::len).sum();
+        if decision.0 == CONFORMS {
+            return format!("{}: {n}", decision.0);
         }
+        let named = tests.iter();
+        let named = named.map(|(test, figures)| format!("{} of {test}", figures.join(", ")));
+        let named: Vec<String> = named.collect();
+        format!("{}: {n} ({})", decision.0, named.join("; "))
     });
     let counts: Vec<String> = counts.collect();
-    format!("figures judged: {}; {}.", rows.len(), counts.join("; "))
+    format!("{}. Figures judged: {}.", counts.join("; "), rows.len())
+}
+
+/// The name of a figure without that of its standard: `accuracy` of `iso230_2.accuracy`.
+fn in_words(figure: &str) -> String {
+    let own = figure.split_once('.').map_or(figure, |(_, own)| own);
+    own.replace(['_', '.'], " ")
 }
 
 fn title(test: &Value) -> &str {
@@ -384,7 +396,7 @@ mod tests {
         assert_eq!(of(1), "does not conform");
         let deviations = &section.figures[0]["deviations_from_iso230_2"];
         assert_eq!(deviations[0]["kind"], "few_runs");
-        assert!(section.answers[0].contains("iso230_2.accuracy of X"));
+        assert!(section.answers[0].contains("accuracy of X"));
         let conditions = |certificate: Value| {
             serde_json::json!({"instruments": [
                 {"kind": "length_reference", "certificate": certificate},
@@ -408,6 +420,24 @@ mod tests {
             serde_json::json!({"test": "X", "iso230_2": {"accuracy": length(0.0085), "n_runs": 5, "centre_mm": [0.1, 0.2], "up": {"accuracy": length(0.0095)}}}),
             serde_json::json!({"test": "Y", "iso230_2": {"accuracy": length(0.0115)}}),
         ]
+    }
+
+    #[test]
+    fn failures_come_first_and_figures_are_grouped_by_their_test() {
+        let row = |figure: &str, test: &str, decision: &str| {
+            [figure, test, "", "", decision].map(str::to_owned).to_vec()
+        };
+        let x = "Positioning X, run 3 on: not compensated, by the length reference";
+        let rows = [
+            row("iso230_2.accuracy", x, "cannot be decided"),
+            row("iso230_2.repeatability", x, "does not conform"),
+            row("iso230_2.up.mean_reversal", x, "does not conform"),
+            row("iso230_2.accuracy", "Y", CONFORMS),
+        ];
+        assert_eq!(
+            in_short(&rows),
+            "does not conform: 2 (repeatability, up mean reversal of Positioning X, run 3 on); cannot be decided: 1 (accuracy of Positioning X, run 3 on); conforms: 1. Figures judged: 4."
+        );
     }
 
     #[test]

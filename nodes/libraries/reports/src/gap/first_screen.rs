@@ -1,6 +1,6 @@
 //! The first screen of a diagnosis: verdict, gap closed, largest cause, what is open, what to measure next.
 
-use gap_diagnosis::report::{Cause, GapReport, NextExperiment, Status};
+use gap_diagnosis::report::{Cause, GapReport, Interval, NextExperiment, Status};
 
 use super::sentences::since;
 use super::words::{in_units, name};
@@ -10,6 +10,9 @@ use crate::section::{capitalised, rounded};
 
 /// Share of the gap that is closed from which on a diagnosis is done.
 const MOSTLY_CLOSED: f64 = 0.5;
+
+/// Width of an interval of a share below which whole percents hide it.
+const NARROW: f64 = 0.02;
 
 /// The screen without its picture.
 pub(super) fn of(report: &GapReport, losses: &[String]) -> Screen {
@@ -104,8 +107,8 @@ fn verdict(report: &GapReport) -> (String, Tone) {
         return (line, Tone::Plain);
     };
     let line = format!(
-        "{title}{rest} {closes} {:.0} % of the gap between machine and simulator, from {} to {} µm rms.",
-        100.0 * share.value,
+        "{title}{rest} {closes} {} % of the gap between machine and simulator (mean square above noise), from {} to {} µm rms.",
+        percent(share)[0],
         super::maybe(report.shrink.rms_um.before),
         super::maybe(report.shrink.rms_um.after)
     );
@@ -115,6 +118,12 @@ fn verdict(report: &GapReport) -> (String, Tone) {
         Tone::Plain
     };
     (capitalised(&line), tone)
+}
+
+/// Value, low and high end of a share in %, with a decimal where its interval is narrow.
+fn percent(share: Interval) -> [String; 3] {
+    let decimals = usize::from(share.high - share.low < NARROW);
+    [share.value, share.low, share.high].map(|part| format!("{:.decimals$}", 100.0 * part))
 }
 
 fn closed(report: &GapReport) -> Option<Tile> {
@@ -128,12 +137,10 @@ fn closed(report: &GapReport) -> Option<Tile> {
     );
     Some(match report.shrink.gap_closed {
         Some(share) => {
-            let value = format!("{:.0} %", 100.0 * share.value);
-            let interval = format!(
-                "95 %: {:.0} to {:.0} %. {more}",
-                100.0 * share.low,
-                100.0 * share.high
-            );
+            let [value, low, high] = percent(share);
+            let value = format!("{value} %");
+            let interval =
+                format!("of its mean square above noise; 95 %: {low} to {high} %. {more}");
             let is_good = share.low > MOSTLY_CLOSED;
             Tile::new("gap closed", value, interval).toned(if is_good {
                 Tone::Good
@@ -281,8 +288,22 @@ mod tests {
         let (verdict, _) = of(&report, &[]).verdict.unwrap();
         assert_eq!(
             verdict,
-            "Backlash X 5.58 ± 0.28 µm closes 95 % of the gap between machine and simulator, from 3.00 to 0.800 µm rms."
+            "Backlash X 5.58 ± 0.28 µm closes 95 % of the gap between machine and simulator (mean square above noise), from 3.00 to 0.800 µm rms."
         );
+    }
+
+    #[test]
+    fn a_narrow_interval_of_a_share_has_two_ends() {
+        let of = |low: f64, value: f64, high: f64| {
+            let closed = json!({"value": value, "low": low, "high": high});
+            let causes = json!([cause("backlash", "X", "width_um", 5.58)]);
+            let screen = super::of(&report(true, causes, shrink(closed, json!([]))), &[]);
+            (screen.tiles[0].value.clone(), screen.tiles[0].more.clone())
+        };
+        let (value, more) = of(0.991, 0.992, 0.994);
+        assert_eq!(value, "99.2 %");
+        assert!(more.contains("99.1 to 99.4 %"), "{more}");
+        assert_eq!(of(0.9, 0.95, 0.97).0, "95 %");
     }
 
     #[test]

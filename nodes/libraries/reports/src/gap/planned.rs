@@ -5,7 +5,7 @@ use maud::html;
 
 use super::{look_alikes, name, section, three};
 use crate::Report;
-use crate::screen::Screen;
+use crate::screen::{Screen, Tile, Tone};
 use crate::section::Section;
 use crate::terminal::{self, Part, Rank};
 
@@ -41,7 +41,7 @@ pub fn page(title: &str, forecast: &Preflight, rehearsed: &Rehearsed<'_>) -> Rep
     Report {
         title: title.to_owned(),
         parts: terminal::apart(sections.iter().map(Part::of)),
-        screen: Screen::default(),
+        screen: screen(forecast, rehearsed.minutes),
         body: html! {
             h2 { (title) }
             @for line in &lines { p { (line) } }
@@ -55,6 +55,47 @@ pub fn page(title: &str, forecast: &Preflight, rehearsed: &Rehearsed<'_>) -> Rep
             "forecast": forecast,
         }),
         lines,
+    }
+}
+
+/// The first screen: time, what would show, and what would not.
+fn screen(forecast: &Preflight, minutes: f64) -> Screen {
+    let n = forecast.effects.len();
+    let alike = imitated_effects(forecast);
+    let minutes = three(minutes);
+    let sentence = format!(
+        "In {minutes} min {n} effects would show; {} of them look like others.",
+        alike.len()
+    );
+    let hidden = forecast.not_excited.iter();
+    let hidden: Vec<String> = hidden.map(|effect| name(&effect.effect, "")).collect();
+    Screen {
+        verdict: Some((sentence, Tone::Plain)),
+        tiles: vec![
+            Tile::new(
+                "time on an ideal machine",
+                format!("{minutes} min"),
+                format!("{} runs", forecast.runs),
+            ),
+            Tile::new("would show and separate", (n - alike.len()).to_string(), ""),
+            Tile::new("look like others", alike.len().to_string(), few(&alike)),
+            Tile::new(
+                "kinds that would not show",
+                hidden.len().to_string(),
+                few(&hidden),
+            ),
+        ],
+        ..Screen::default()
+    }
+}
+
+/// The first names of a list, and how many follow.
+fn few(names: &[String]) -> String {
+    let shown = names.iter().take(MOST_NAMES).cloned();
+    let shown = shown.collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(MOST_NAMES) {
+        0 => shown,
+        n => format!("{shown} and {n} more"),
     }
 }
 
@@ -132,10 +173,15 @@ fn held_out(forecast: &Preflight) -> String {
     }
 }
 
-fn imitated(forecast: &Preflight) -> String {
+/// Names of the effects that others imitate.
+fn imitated_effects(forecast: &Preflight) -> Vec<String> {
     let imitated = forecast.effects.iter();
     let imitated = imitated.filter(|effect| effect.sin_alone < IMITATED);
-    let names: Vec<String> = imitated.map(title_of).collect();
+    imitated.map(title_of).collect()
+}
+
+fn imitated(forecast: &Preflight) -> String {
+    let names = imitated_effects(forecast);
     if names.is_empty() {
         return "Every one of them can be told from the others.".to_owned();
     }

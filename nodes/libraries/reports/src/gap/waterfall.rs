@@ -16,13 +16,15 @@ use maud::Markup;
 
 use super::words::name;
 use crate::page;
-use crate::svg::{Scale, escaped, short};
+use crate::svg::{Scale, escaped, unsigned_zero};
 
 /// Most causes with a bar of their own; the others share one.
 const MOST_BARS: usize = 6;
 const WATERFALL_WIDTH: f64 = 720.0;
 /// Height of a bar with its text, px.
 const ROW_PX: f64 = 60.0;
+/// Most decimals of a size, µm: more are not measured.
+const MOST_DECIMALS: f64 = 3.0;
 /// Left and right end of the bars, px.
 const BARS_PX: [f64; 2] = [8.0, 712.0];
 
@@ -99,8 +101,20 @@ pub(super) fn picture(report: &GapReport, apart: &[Apart]) -> Result<Option<Mark
     Ok(Some(page::figure(&svg, caption)))
 }
 
+/// Decimals of two digits of a floor, µm.
+fn decimals(floor_um: f64) -> usize {
+    if floor_um > 0.0 && floor_um.is_finite() {
+        (1.0 - floor_um.log10().floor()).clamp(0.0, MOST_DECIMALS) as usize
+    } else {
+        MOST_DECIMALS as usize
+    }
+}
+
 fn drawn(bars: &[Bar], floor_um: f64) -> Result<String, std::fmt::Error> {
     let height = ROW_PX * bars.len() as f64 + 34.0;
+    // All bars have the decimals that the floor needs: smaller parts are noise.
+    let decimals = decimals(floor_um);
+    let size = |um: f64| unsigned_zero(format!("{um:.decimals$}"));
     let greatest = bars
         .iter()
         .fold(floor_um, |most, bar| most.max(bar.to_um).max(bar.from_um));
@@ -131,13 +145,14 @@ fn drawn(bars: &[Bar], floor_um: f64) -> Result<String, std::fmt::Error> {
         bottom + 6.0,
         at.min(WATERFALL_WIDTH - 220.0),
         bottom + 28.0,
-        short(floor_um)
+        size(floor_um)
     )?;
     // Names stand above the line of the floor.
     for (row, bar) in bars.iter().enumerate() {
         let change = bar.to_um - bar.from_um;
-        let size = short(change.abs());
-        let sign = match bar.from_um > 0.0 && size != "0" {
+        let size = size(change.abs());
+        let is_zero = size.chars().all(|c| c == '0' || c == '.');
+        let sign = match bar.from_um > 0.0 && !is_zero {
             true if change <= 0.0 => "−",
             true => "+",
             false => "",
@@ -169,9 +184,25 @@ mod tests {
         assert!((bars[2].to_um - 3.0).abs() < 1e-12);
         assert!((bars[3].to_um - 3.0).abs() < 1e-12);
         let text = drawn(&bars, 0.4).unwrap();
-        for words in ["−1.39 µm", "5.00 µm", "3.00 µm", "floor 0.400 µm"] {
+        for words in ["−1.39 µm", "5.00 µm", "3.00 µm", "floor 0.40 µm"] {
             assert!(text.contains(words), "{words}: {text}");
         }
+    }
+
+    #[test]
+    fn every_bar_has_the_decimals_of_the_floor() {
+        let causes = [("a".to_owned(), 0.9999), ("b".to_owned(), 0.0001)];
+        let text = drawn(&bars(1.58, 0.153, &causes), 0.0804).unwrap();
+        for words in ["b: −0.001 µm", "1.580 µm", "0.153 µm", "floor 0.080 µm"] {
+            assert!(text.contains(words), "{words}: {text}");
+        }
+        let text = drawn(&bars(14.2, 2.46, &[("a".to_owned(), 1.0)]), 1.32).unwrap();
+        assert!(
+            text.contains("a: −11.7 µm") && text.contains("floor 1.3 µm"),
+            "{text}"
+        );
+        let text = drawn(&bars(1.0, 1.0, &[("a".to_owned(), 1.0)]), 0.5).unwrap();
+        assert!(text.contains("a: 0.00 µm"), "{text}");
     }
 
     #[test]

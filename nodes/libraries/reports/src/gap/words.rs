@@ -94,7 +94,7 @@ pub(super) fn covariate(id: &str) -> String {
     }
     if let Some(letter) = id.strip_prefix("sense*log_distance_since_reversal_") {
         return format!(
-            "the way since {} reversed, with the sign of the motion",
+            "the distance since {} reversed, with the sign of the motion",
             axis(letter)
         );
     }
@@ -122,7 +122,7 @@ pub(super) fn place(report: &GapReport) -> Option<String> {
         }
     };
     Some(format!(
-        "most of it is in {} (direction {}) and goes with {}; of the gap's structure {} goes with that and nothing else, {} with it or others alike",
+        "most of it is in {} (direction {}) and changes with {}; that alone explains {} of the gap's structure, and {} more is shared with other quantities",
         place.channel,
         place.direction,
         covariate(&place.covariate),
