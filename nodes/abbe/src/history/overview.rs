@@ -21,7 +21,7 @@ const MOST_FIGURES: usize = 2_000;
 /// Most names in a sentence.
 const MOST_NAMES: usize = 3;
 /// Begin of the names of coefficients, of which a geometric model has hundreds.
-const GEOMETRY: &str = "geometry.";
+const GEOMETRY_PREFIX: &str = "geometry.";
 
 /// The overview of a machine.
 ///
@@ -46,7 +46,7 @@ pub fn of(
         if entry["significant"] == true {
             changing.push(title(&series));
         }
-        let is_geometry = series.name.starts_with(GEOMETRY);
+        let is_geometry = series.name.starts_with(GEOMETRY_PREFIX);
         if is_geometry {
             &mut geometry
         } else {

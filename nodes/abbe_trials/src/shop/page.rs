@@ -16,7 +16,7 @@ use trials::{Arm, Verdict};
 use super::ten_lines::ten_lines;
 use crate::table::{computer, markdown_table};
 
-const TITLE: &str = "Blind trials on the sessions that shops have";
+const SHOP_TITLE: &str = "Blind trials on the sessions that shops have";
 /// Trials of an arm that the protocol wants.
 const WANTED: usize = 300;
 /// Rows of lists of names.
@@ -55,7 +55,7 @@ impl Table {
         let lines = self.lines();
         let terminal: Vec<String> = parts.iter().map(Section::terminal).collect();
         let report = Report {
-            title: TITLE.to_owned(),
+            title: SHOP_TITLE.to_owned(),
             lines: vec![],
             parts: vec![],
             screen: Screen::default(),
@@ -90,7 +90,7 @@ impl Table {
     }
 
     fn markdown(&self, lines: &[String], parts: &[Section]) -> String {
-        let mut text = format!("# {TITLE}\n\n");
+        let mut text = format!("# {SHOP_TITLE}\n\n");
         for (number, line) in ten_lines(&self.arms).iter().enumerate() {
             let _ = writeln!(text, "{}. {line}", number + 1);
         }

@@ -37,7 +37,7 @@ const FEWEST_WINDOWS: usize = 4;
 /// Steps of time within a window differ by this factor at most.
 const MOST_UNEVEN: f64 = 1.5;
 /// What is left in a window, over that of the middle one.
-const MOST_LEFT: f64 = 4.0;
+const MOST_LEFT_IN_WINDOW: f64 = 4.0;
 /// Greatest p.
 const MOST_SHARED: f64 = 0.95;
 /// Least p that is taken: white noise is as well told by neighbours alone.
@@ -63,14 +63,14 @@ pub(super) fn shared(
     let mut squares: Vec<f64> = windows.iter().map(|[square, _]| *square).collect();
     let middle = squares.len() / 2;
     let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
-    let most = MOST_LEFT * *median;
+    let most = MOST_LEFT_IN_WINDOW * *median;
     windows.retain(|[square, _]| *square <= most);
     let sum = |k: usize| windows.iter().map(|window| window[k]).sum::<f64>();
     let (square, product) = (sum(0), sum(1));
     let ratio = product / square;
     let rows = count(windows.len() * STRIDE_ROWS);
     let [white_square, white_product] = expected(&left, 0.0);
-    if !(ratio - white_product / white_square > MIN_SCORE / rows.sqrt()) {
+    if ratio <= white_product / white_square + MIN_SCORE / rows.sqrt() {
         return None;
     }
     let share = root(|share| {

@@ -22,7 +22,7 @@ const BARS_WIDTH: f64 = 560.0;
 /// Height of a bar with its name, px.
 const BAR_ROW_PX: f64 = 46.0;
 /// Most letters of a name in the usual size on a phone.
-const MOST_LETTERS: usize = 44;
+const MOST_LETTERS_OF_NAME: usize = 44;
 /// Left and right end of the bars, px.
 const BAR_LENGTH_PX: [f64; 2] = [6.0, 536.0];
 
@@ -65,7 +65,7 @@ fn draw(text: &mut String, axis: &str, bars: &[Bar]) -> std::fmt::Result {
         write!(
             text,
             "<text class=\"ring{}\" x=\"{}\" y=\"{:.1}\">{}</text><g class=\"c0\"><rect x=\"{}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"14\" fill=\"currentColor\" fill-opacity=\"{opacity}\"/></g>",
-            if bar.name.chars().count() > MOST_LETTERS {
+            if bar.name.chars().count() > MOST_LETTERS_OF_NAME {
                 " long"
             } else {
                 ""

@@ -15,7 +15,7 @@ use crate::section::capitalised;
 /// Most tiles.
 const MOST_TILES: usize = 5;
 /// Most letters of a tile's remark; the whole stands below.
-const MOST_LETTERS: usize = 200;
+const MOST_LETTERS_OF_TILE: usize = 200;
 /// Digits of a commit that people compare.
 const COMMIT_DIGITS: usize = 10;
 /// A time before 1971 is that of a table whose begin nobody stated, s since 1970.
@@ -89,10 +89,10 @@ impl Tile {
 
 /// A remark that a tile has room for.
 fn shortened(text: &str) -> String {
-    if text.chars().count() <= MOST_LETTERS {
+    if text.chars().count() <= MOST_LETTERS_OF_TILE {
         return text.to_owned();
     }
-    let begin: String = text.chars().take(MOST_LETTERS).collect();
+    let begin: String = text.chars().take(MOST_LETTERS_OF_TILE).collect();
     let whole_words = begin
         .rsplit_once(' ')
         .map_or(begin.as_str(), |(words, _)| words);
@@ -410,7 +410,7 @@ mod tests {
     fn a_long_remark_is_cut_at_a_word() {
         let long = "word ".repeat(80);
         let cut = shortened(&long);
-        assert!(cut.chars().count() <= MOST_LETTERS + 2 && cut.ends_with("word …"));
+        assert!(cut.chars().count() <= MOST_LETTERS_OF_TILE + 2 && cut.ends_with("word …"));
         assert_eq!(shortened("short"), "short");
     }
 }

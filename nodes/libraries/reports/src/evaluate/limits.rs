@@ -207,10 +207,12 @@ fn one_sided_line(name: &str, key: &str) -> String {
     )
 }
 
+/// Figures by test.
+type ByTest<'r> = BTreeMap<&'r str, Vec<String>>;
+
 /// The decisions of a table of figures in one sentence, failures first; each figure that does not conform is named.
 fn in_short(rows: &[Vec<String>]) -> String {
-    let mut by_decision: BTreeMap<(bool, Reverse<&str>), BTreeMap<&str, Vec<String>>> =
-        BTreeMap::new();
+    let mut by_decision: BTreeMap<(bool, Reverse<&str>), ByTest<'_>> = BTreeMap::new();
     for row in rows {
         if let [figure, test, _, _, decision, ..] = row.as_slice() {
             let key = (decision.starts_with(CONFORMS), Reverse(decision.as_str()));

@@ -15,7 +15,7 @@ use super::truth::{Name, ShopEffect, ShopTruth, name};
 use super::{ShopSession, Table};
 
 /// D of hidden effects.
-const D: [f64; 2] = [4.0, 300.0];
+const D_OF_BALLBAR: [f64; 2] = [4.0, 300.0];
 /// Letters of the axes.
 const LETTERS: [&str; 3] = ["X", "Y", "Z"];
 /// Planes: name, axes, and the pair as the catalogue names it.
@@ -115,7 +115,7 @@ fn hide(
         .collect();
     let d_of_one = metric.d(&one, set_up);
     let ([low, high], _) = motion.sizes();
-    let size = (log_uniform(random, D) / d_of_one.max(1e-9)).clamp(low, high);
+    let size = (log_uniform(random, D_OF_BALLBAR) / d_of_one.max(1e-9)).clamp(low, high);
     let size = if motion.has_both_signs() {
         sign(random) * size
     } else {

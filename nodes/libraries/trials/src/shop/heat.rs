@@ -12,11 +12,11 @@ use rand_pcg::Pcg64Mcg;
 use super::dice::{log_uniform, normal};
 
 /// Step of the integration, s.
-const STEP_S: f64 = 1.0;
+const HEAT_STEP_S: f64 = 1.0;
 /// Steps between kept temperatures.
 pub const KEPT_EVERY: usize = 20;
 /// Time between kept temperatures, s.
-pub const KEPT_S: f64 = STEP_S * KEPT_EVERY as f64;
+pub const KEPT_S: f64 = HEAT_STEP_S * KEPT_EVERY as f64;
 /// Layers of a wall.
 const LAYERS: usize = 10;
 /// Masses: front and rear bearing, housing, column, bed, nut.
@@ -112,7 +112,7 @@ impl Course {
                 watt[2] * load.axis[step] - 0.5 * (nut - bed),
             ];
             for k in 0..MASSES {
-                heat[k] += STEP_S * (gains[k] - lost[k] * (heat[k] - air)) / capacity[k];
+                heat[k] += HEAT_STEP_S * (gains[k] - lost[k] * (heat[k] - air)) / capacity[k];
             }
         }
         course
@@ -143,7 +143,7 @@ fn room(random: &mut Pcg64Mcg, steps: usize) -> Vec<f64> {
     let swing_s = random.random_range(900.0..3600.0);
     let mut wander = 0.0;
     let of = |step: usize| {
-        let at_s = step as f64 * STEP_S;
+        let at_s = step as f64 * HEAT_STEP_S;
         if step.is_multiple_of(60) {
             wander = 0.998 * wander + 0.02 * normal(random);
         }

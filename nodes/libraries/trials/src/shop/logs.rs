@@ -14,7 +14,7 @@ use super::truth::{Follow, Name, ShopEffect, ShopTruth, name};
 use super::{ShopSession, Table};
 
 /// D of hidden effects.
-const D: [f64; 2] = [5.0, 400.0];
+const D_OF_LOGS: [f64; 2] = [5.0, 400.0];
 /// Range of lags, min.
 const LAG_MIN: [f64; 2] = [2.0, 120.0];
 /// Range of growth, µm/K.
@@ -155,7 +155,7 @@ fn hide(
     let one: Vec<f64> = mean.iter().map(|value| value - face[0]).collect();
     let d_of_one = metric.d(&times.pick(&one), &[vec![1.0; metric.len()]]);
     let [low, high] = GROWTH_UM_PER_K;
-    let size = (log_uniform(random, D) / d_of_one.max(1e-9)).clamp(low, high);
+    let size = (log_uniform(random, D_OF_LOGS) / d_of_one.max(1e-9)).clamp(low, high);
     Hidden {
         node,
         um_per_k: sign(random) * size,

@@ -11,7 +11,7 @@ use rand_pcg::Pcg64Mcg;
 use super::dice::log_uniform;
 
 /// Step of the integration, s.
-const STEP_S: f64 = 5e-4;
+const SERVO_STEP_S: f64 = 5e-4;
 /// Elements of lost motion.
 const ELEMENTS: usize = 5;
 
@@ -112,16 +112,17 @@ impl Motion {
                 let (mut off, mut speed, mut rest) = (0.0, 0.0, 0.0);
                 let mut friction_before: Option<f64> = None;
                 circle.followed(|before, now| {
-                    let moved = radius_mm * (along(*axis, now) - along(*axis, before)) / STEP_S;
+                    let moved =
+                        radius_mm * (along(*axis, now) - along(*axis, before)) / SERVO_STEP_S;
                     // Friction sticks a little harder while the axis is slow.
                     let friction =
                         moved / (moved.abs() + 0.05) * (1.0 + 0.4 * (-moved.abs() / 2.0).exp());
                     let change = friction - friction_before.unwrap_or(friction);
                     friction_before = Some(friction);
-                    rest += change - rest * STEP_S / integral_s;
+                    rest += change - rest * SERVO_STEP_S / integral_s;
                     let force = frequency * frequency * (-rest - off);
-                    speed += STEP_S * (force - 2.0 * damping * frequency * speed);
-                    off += STEP_S * speed;
+                    speed += SERVO_STEP_S * (force - 2.0 * damping * frequency * speed);
+                    off += SERVO_STEP_S * speed;
                     off * along(*axis, now)
                 })
             }
@@ -136,7 +137,7 @@ impl Circle {
 
     /// Readings of what depends on the past: from a quarter of a turn before the first one, in steps of time.
     fn followed(&self, mut step: impl FnMut(f64, f64) -> f64) -> Vec<f64> {
-        let turn = STEP_S * self.feed_mm_s / self.radius_mm;
+        let turn = SERVO_STEP_S * self.feed_mm_s / self.radius_mm;
         let Some(first) = self.angles.first() else {
             return vec![];
         };

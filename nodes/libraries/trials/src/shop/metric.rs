@@ -23,7 +23,7 @@ use rand_pcg::Pcg64Mcg;
 use super::dice::{heavy, log_uniform, normal};
 
 /// Waves of the smooth deviation.
-const WAVES: usize = 6;
+const WAVES_BETWEEN_RUNS: usize = 6;
 /// Their periods in one run.
 const PERIODS: [f64; 2] = [0.4, 4.0];
 /// Share of its square below which a direction counts as taken out.
@@ -38,7 +38,7 @@ pub struct Floor {
     pub between_runs_um: f64,
     /// What a reading keeps of the noise of the one before.
     pub memory: f64,
-    periods: [f64; WAVES],
+    periods: [f64; WAVES_BETWEEN_RUNS],
 }
 
 impl Floor {
@@ -48,7 +48,7 @@ impl Floor {
             white_um: log_uniform(random, white_um),
             between_runs_um: log_uniform(random, between_runs_um),
             memory: 0.0,
-            periods: [(); WAVES].map(|()| random.random_range(PERIODS[0]..PERIODS[1])),
+            periods: [(); WAVES_BETWEEN_RUNS].map(|()| random.random_range(PERIODS[0]..PERIODS[1])),
         }
     }
 
@@ -81,19 +81,19 @@ impl Floor {
         (0..values.len()).map(of).collect()
     }
 
-    fn waves(&self, u: f64) -> [f64; 2 * WAVES] {
-        let size = self.between_runs_um / (WAVES as f64).sqrt();
-        let mut values = [0.0; 2 * WAVES];
+    fn waves(&self, u: f64) -> [f64; 2 * WAVES_BETWEEN_RUNS] {
+        let size = self.between_runs_um / (WAVES_BETWEEN_RUNS as f64).sqrt();
+        let mut values = [0.0; 2 * WAVES_BETWEEN_RUNS];
         for (k, periods) in self.periods.iter().enumerate() {
             let (sin, cos) = (TAU * periods * u).sin_cos();
-            (values[k], values[WAVES + k]) = (size * cos, size * sin);
+            (values[k], values[WAVES_BETWEEN_RUNS + k]) = (size * cos, size * sin);
         }
         values
     }
 
     /// Noise of one run, at its readings, µm.
     pub fn run(&self, random: &mut Pcg64Mcg, course: &[f64]) -> Vec<f64> {
-        let drawn = [(); 2 * WAVES].map(|()| normal(random));
+        let drawn = [(); 2 * WAVES_BETWEEN_RUNS].map(|()| normal(random));
         let smooth = |u: &f64| -> f64 {
             let waves = self.waves(*u);
             waves
@@ -125,16 +125,19 @@ impl Metric {
     pub fn of(floor: &Floor, runs: &[Vec<f64>]) -> Self {
         let mut from = 0;
         let of = |course: &Vec<f64>| {
-            let rows: Vec<[f64; 2 * WAVES]> = course.iter().map(|u| floor.waves(*u)).collect();
+            let rows: Vec<[f64; 2 * WAVES_BETWEEN_RUNS]> =
+                course.iter().map(|u| floor.waves(*u)).collect();
             let column = |k: usize| {
                 let own: Vec<f64> = rows.iter().map(|row| row[k]).collect();
                 DVector::from_vec(floor.whitened(&own))
             };
-            let waves: Vec<DVector<f64>> = (0..2 * WAVES).map(column).collect();
+            let waves: Vec<DVector<f64>> = (0..2 * WAVES_BETWEEN_RUNS).map(column).collect();
             let waves = DMatrix::from_columns(&waves);
-            let inner = DMatrix::identity(2 * WAVES, 2 * WAVES) + waves.tr_mul(&waves);
+            let inner = DMatrix::identity(2 * WAVES_BETWEEN_RUNS, 2 * WAVES_BETWEEN_RUNS)
+                + waves.tr_mul(&waves);
             let inner = inner.try_inverse();
-            let inner = inner.unwrap_or_else(|| DMatrix::zeros(2 * WAVES, 2 * WAVES));
+            let inner = inner
+                .unwrap_or_else(|| DMatrix::zeros(2 * WAVES_BETWEEN_RUNS, 2 * WAVES_BETWEEN_RUNS));
             let range = from..from + course.len();
             from = range.end;
             (range, waves, inner)

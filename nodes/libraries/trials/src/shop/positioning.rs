@@ -12,7 +12,7 @@ use super::truth::{Name, ShopEffect, ShopTruth, name};
 use super::{ShopSession, Table};
 
 /// D of hidden effects.
-const D: [f64; 2] = [4.0, 300.0];
+const D_OF_POSITIONING: [f64; 2] = [4.0, 300.0];
 /// Feed between the targets, mm/s.
 const FEED_MM_S: f64 = 100.0;
 /// Range of a stop's dwell, s.
@@ -213,7 +213,7 @@ impl Plan {
         let one = readings(random, kind, stops, period_mm);
         let d_of_one = metric.d(&in_runs(stops, &one), &[vec![1.0; stops.len()]]);
         let ([low, high], _) = kind.sizes();
-        let size = (log_uniform(random, D) / d_of_one.max(1e-9)).clamp(low, high);
+        let size = (log_uniform(random, D_OF_POSITIONING) / d_of_one.max(1e-9)).clamp(low, high);
         let is_signed = kind != Kind::Cyclic;
         Hidden {
             kind,

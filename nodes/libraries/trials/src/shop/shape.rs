@@ -8,7 +8,7 @@ use rand_pcg::Pcg64Mcg;
 use super::dice::{log_uniform, normal, sign};
 
 /// Waves of a curve.
-const WAVES: usize = 10;
+const WAVES_OF_SHAPE: usize = 10;
 /// Share of curves with dents, and with a step.
 const DENTED: f64 = 0.4;
 const STEPPED: f64 = 0.25;
@@ -29,7 +29,7 @@ impl Shape {
     pub fn draw(random: &mut Pcg64Mcg, places: usize) -> Self {
         let most = ((places.max(5) - 1) as f64 / 4.0).max(1.2);
         let mut shape = Self::default();
-        for _ in 0..WAVES {
+        for _ in 0..WAVES_OF_SHAPE {
             let cycles = random.random_range(0.3..most);
             let size = normal(random) / cycles.powf(0.8);
             shape
