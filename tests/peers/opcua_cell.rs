@@ -22,6 +22,8 @@ const BAG: &str = "bags/rosbag2_touches";
 const LATENCY_MS: f64 = 3.7;
 /// Between two writings of the server.
 const BEAT: Duration = Duration::from_millis(20);
+/// Between two states that the server is given: what a control offers by OPC UA, rather than each of its servo periods.
+const STATE_PERIOD: Span = Span::from_nanos(5_000_000);
 /// The program, the server and the graph are ready after this time.
 const LEAD: Span = Span::from_nanos(8_000_000_000);
 const END: Duration = Duration::from_secs(120);
@@ -102,6 +104,7 @@ fn nanos(time: &Time) -> i64 {
 /// The session of a bag, later by a span, in the order of its recording: log time, and what happens.
 fn session(bag: &Bag, by: Span) -> Vec<(i64, Moment)> {
     let mut moments = Vec::new();
+    let mut next_state = i64::MIN;
     let mut messages = bag.messages(Order::LogTime);
     while let Some(event) = messages.next_event() {
         let Event::Message(message) = event else {
@@ -112,6 +115,10 @@ fn session(bag: &Bag, by: Span) -> Vec<(i64, Moment)> {
             let mut state: msg::AxisState = from_cdr(message.data).unwrap();
             later(&mut state.controller_stamp, by);
             let at = nanos(&state.controller_stamp);
+            if at < next_state {
+                continue;
+            }
+            next_state = at + STATE_PERIOD.nanos();
             let rows = state.axis.iter().enumerate().flat_map(|(place, axis)| {
                 let (act, cmd) = (state.motor[place], state.commanded[place]);
                 [
