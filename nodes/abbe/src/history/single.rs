@@ -161,9 +161,9 @@ fn trend_line(evaluated: &Evaluated) -> Vec<String> {
         "No significant trend"
     };
     let mut lines = vec![format!(
-        "{verdict}{since}: {slope} per year (95 %, {} values); chance in noise alone {:.2} %.",
+        "{verdict}{since}: {slope} per year (95 %, {} values); chance in noise alone {}.",
         trend.n,
-        trend.p_value * 100.0
+        in_percent(trend.p_value)
     )];
     if let Some(ratio) = trend.birge_ratio.filter(|ratio| *ratio > SCATTERED) {
         lines.push(format!(
@@ -171,6 +171,15 @@ fn trend_line(evaluated: &Evaluated) -> Vec<String> {
         ));
     }
     lines
+}
+
+/// A probability with two decimals of a percent.
+fn in_percent(chance: f64) -> String {
+    const LEAST: f64 = 1e-4;
+    if chance < LEAST {
+        return "below 0.01 %".to_owned();
+    }
+    format!("{:.2} %", chance * 100.0)
 }
 
 fn change_line(change: &ChangePoint, shown: &Shown) -> String {
@@ -386,4 +395,15 @@ fn as_json(series: &Series, kept: &[Kept], evaluated: &Evaluated, limits: &[Valu
         "changes": evaluated.changes.iter().map(change).collect::<Vec<_>>(),
         "limits": limits,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chance_is_never_nothing() {
+        assert_eq!(in_percent(0.61008), "61.01 %");
+        assert_eq!(in_percent(3e-9), "below 0.01 %");
+    }
 }

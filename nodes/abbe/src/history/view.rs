@@ -256,7 +256,8 @@ impl View {
     }
 
     fn trends(&self, store: &Store, machine: &str, name: &str, key: &SeriesKey) -> Result<Page> {
-        let all = store.series(key)?;
+        let mut all = store.series(key)?;
+        all.sort_by_key(|series| is_form(&series.name));
         if all.is_empty() {
             bail!("{}", nothing(store, machine, name)?);
         }
@@ -283,6 +284,11 @@ impl View {
         }
         Ok(page)
     }
+}
+
+/// Whether a figure is a height of an effect's free form, which says little beside the effect's size.
+fn is_form(name: &str) -> bool {
+    name.starts_with("effect.") && name.contains(".free_")
 }
 
 /// The first screen: what decides, the last values, and the first plot.
@@ -409,6 +415,17 @@ mod tests {
     struct CommandLine {
         #[command(flatten)]
         view: View,
+    }
+
+    #[test]
+    fn the_size_of_an_effect_stands_before_its_form() {
+        let mut names = [
+            "effect.backlash.free_0p01mm_um",
+            "effect.backlash.width_um",
+            "iso230_2.free_figure",
+        ];
+        names.sort_by_key(|name| is_form(name));
+        assert_eq!(names[2], "effect.backlash.free_0p01mm_um");
     }
 
     fn said(words: &[&str]) -> Option<String> {

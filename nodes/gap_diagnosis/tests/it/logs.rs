@@ -5,6 +5,7 @@
 //!   y(t) = A (1 - (T exp(-t/T) - tau exp(-t/tau)) / (T - tau))
 //! ```
 
+use gap_diagnosis::judgement::CheckId;
 use gap_diagnosis::report::{Cause, Status};
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
 use gap_diagnosis::{Diagnosis, GapConfig, Note, diagnose};
@@ -338,4 +339,35 @@ fn of_two_thermometers_of_a_spindle_the_one_that_predicts_is_reported_with_its_l
     assert!((rear.um_per_k - 0.93).abs() < 0.03, "{found:#?}");
     assert!((of("bed").um_per_k + 3.2).abs() < 0.2, "{found:#?}");
     assert!(found.share > 0.99, "{found:#?}");
+}
+
+/// Noise that neighbouring rows share by so much.
+const SHARED: f64 = 0.7;
+
+/// Four warm-ups of other heats, so that none repeats another, and noise that neighbouring rows share.
+#[test]
+fn noise_that_neighbouring_rows_share_hides_no_cause_of_a_log() {
+    let machine = machine(FRONT);
+    let mut log = Log::new(&machine, 62);
+    let (mut shared_um, free) = (0.0, (1.0 - SHARED * SHARED).sqrt());
+    for (run, rise_k) in [8.0, 5.0, 11.0, 6.5].into_iter().enumerate() {
+        let run = u32::try_from(run).unwrap();
+        let begin_s = 86_400.0 * f64::from(run);
+        log.segment(run + 1, true, begin_s);
+        for minute in 0..120 {
+            let since_s = 60.0 * f64::from(minute);
+            shared_um = SHARED * shared_um + log.normal(0.2 * free);
+            let um = -1.5 * lagged_k(rise_k, 1800.0, 600.0, since_s) + shared_um;
+            let degc = 20.0 + warm_k(rise_k, 1800.0, since_s) + log.normal(0.02);
+            log.row(begin_s + since_s, um, &[("spindle_front", degc)]);
+        }
+        log.segment(run + 1, false, begin_s + 7200.0);
+    }
+    let diagnosis = log.diagnosed(&machine);
+    let cause = only(&diagnosis, "spindle_growth");
+    let by_thermometer = { cause.why.iter() }.find(|c| c.check == CheckId::OwnThermometer);
+    assert!(
+        by_thermometer.is_some_and(|c| !c.has_failed()),
+        "{cause:#?}"
+    );
 }
