@@ -162,7 +162,7 @@ pub fn as_process(folder: &Path, bags: &[&str], question: &Question<'_>) -> Resu
 /// A machine with its session.
 pub type Recording = (MachineFile, Session);
 
-/// The sessions of rigs of one machine, without a bag; or why there is none.
+/// The sessions of rigs of one machine, without a bag; or the reason why they cannot be made.
 ///
 /// # Errors
 /// When a rig cannot be measured.

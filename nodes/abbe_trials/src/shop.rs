@@ -28,10 +28,10 @@ const REPORT: &str = "told/gap.json";
 /// Done, and done with a part of the input left out.
 const DONE: [i32; 2] = [0, 3];
 
-/// A report with its page, or why there is none.
+/// A report with its page, or the reason why the session was refused.
 type Reported = Result<(GapReport, String), String>;
 
-/// Makes a trial; `tell` is told of its seal.
+/// Makes a trial; `tell` gets the seal of its truth first.
 ///
 /// # Errors
 /// When it cannot be made.

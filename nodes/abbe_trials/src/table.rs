@@ -93,7 +93,7 @@ impl Table {
     /// As JSON.
     ///
     /// # Errors
-    /// When a number is none.
+    /// When a number is not finite.
     pub fn json(&self) -> Result<String> {
         Ok(serde_json::to_string_pretty(self)?)
     }
@@ -130,20 +130,8 @@ impl Table {
         for line in self.lines() {
             let _ = writeln!(text, "{line}\n");
         }
-        for section in self.parts()?.into_iter().map(Part::in_text) {
-            let _ = writeln!(text, "## {}\n", section.title);
-            for line in &section.lines {
-                let _ = writeln!(text, "{line}\n");
-            }
-            for rows in &section.tables {
-                text.push_str(&markdown_table(rows));
-                if !rows.note.is_empty() {
-                    let _ = writeln!(text, "{}\n", rows.note);
-                }
-            }
-        }
-        text.truncate(text.trim_end().len());
-        text.push('\n');
+        let sections: Vec<Section> = self.parts()?.into_iter().map(Part::in_text).collect();
+        append_markdown(&mut text, &sections);
         Ok(text)
     }
 
@@ -221,6 +209,24 @@ pub(crate) fn computer() -> String {
         .find_map(|line| line.strip_prefix("model name")?.split_once(": "));
     let name = model.map_or("a processor without a name", |(_, name)| name.trim());
     format!("{cores} cores of {name}")
+}
+
+/// Appends sections as Markdown, which ends with one line break.
+pub fn append_markdown(text: &mut String, sections: &[Section]) {
+    for section in sections {
+        let _ = writeln!(text, "## {}\n", section.title);
+        for line in &section.lines {
+            let _ = writeln!(text, "{line}\n");
+        }
+        for rows in &section.tables {
+            text.push_str(&markdown_table(rows));
+            if !rows.note.is_empty() {
+                let _ = writeln!(text, "{}\n", rows.note);
+            }
+        }
+    }
+    text.truncate(text.trim_end().len());
+    text.push('\n');
 }
 
 pub(crate) fn markdown_table(rows: &Rows) -> String {

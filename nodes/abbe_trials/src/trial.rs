@@ -68,7 +68,7 @@ struct Said {
 }
 
 impl How {
-    /// Makes a trial; `tell` is told of its seal.
+    /// Makes a trial; `tell` gets the seal of its truth first.
     ///
     /// # Errors
     /// When it cannot be made.

@@ -14,7 +14,7 @@ use trials::shop::{Line, ShopTally, Split};
 use trials::{Arm, Verdict};
 
 use super::ten_lines::ten_lines;
-use crate::table::{computer, markdown_table};
+use crate::table::{append_markdown, computer};
 
 const SHOP_TITLE: &str = "Blind trials on the sessions that shops have";
 /// Trials of an arm that the protocol wants.
@@ -49,7 +49,7 @@ impl Table {
     /// For a terminal, as JSON, as a page and as Markdown.
     ///
     /// # Errors
-    /// When a number is none.
+    /// When a number is not finite.
     pub fn contents(&self) -> Result<[String; 4]> {
         let parts: Vec<Section> = self.arms.iter().map(section).collect();
         let lines = self.lines();
@@ -98,20 +98,7 @@ impl Table {
         for line in lines {
             let _ = writeln!(text, "{line}\n");
         }
-        for section in parts {
-            let _ = writeln!(text, "## {}\n", section.title);
-            for line in &section.lines {
-                let _ = writeln!(text, "{line}\n");
-            }
-            for rows in &section.tables {
-                text.push_str(&markdown_table(rows));
-                if !rows.note.is_empty() {
-                    let _ = writeln!(text, "{}\n", rows.note);
-                }
-            }
-        }
-        text.truncate(text.trim_end().len());
-        text.push('\n');
+        append_markdown(&mut text, parts);
         text
     }
 }

@@ -15,7 +15,7 @@
 //!
 //! # Holds when
 //! Rows follow one another evenly, and what the machine does changes little within W rows. A memory that lasts longer than a window
-//! is not told from the machine.
+//! cannot be separated from what the machine does.
 //!
 //! # References
 //! \[1\] G. E. P. Box, G. M. Jenkins, G. C. Reinsel, Time Series Analysis, 4th ed., Wiley 2008, 3.2 (autoregression).
@@ -40,7 +40,7 @@ const MOST_UNEVEN: f64 = 1.5;
 const MOST_LEFT_IN_WINDOW: f64 = 4.0;
 /// Greatest p.
 const MOST_SHARED: f64 = 0.95;
-/// Least p that is taken: white noise is as well told by neighbours alone.
+/// Least p that is taken: for white noise, neighbouring rows alone suffice.
 const LEAST_SHARED: f64 = 0.15;
 /// Standard errors by which the ratio exceeds that of white noise.
 const MIN_SCORE: f64 = 3.0;

@@ -119,7 +119,7 @@ const AT_TARGETS_ALONE: [&str; 4] = [
     "free_by_place6_um",
 ];
 
-/// An effect and how the names of its free amplitudes begin of which the same holds: on paths it is told by its feeds.
+/// An effect, and the first part of the names of its free amplitudes that only targets determine. On paths its feeds determine it.
 const BY_FEED: (&str, &str) = ("feed_lost_motion", "free_by_place");
 
 /// Whether a free amplitude of an instance may be in its wide form.

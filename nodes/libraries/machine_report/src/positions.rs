@@ -43,7 +43,7 @@ pub struct Positions {
 }
 
 impl Positions {
-    /// Of a machine whose axes are these, none of which has come.
+    /// Of a machine with these axes, before the first position of any of them.
     #[must_use]
     pub fn awaiting(axes: AxisSet) -> Self {
         Self {

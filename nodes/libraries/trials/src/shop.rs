@@ -17,7 +17,7 @@ use crate::arm::Arm;
 use crate::trial::stream;
 
 mod ballbar;
-mod dice;
+pub(crate) mod dice;
 mod heat;
 mod judge;
 mod layout;

@@ -17,6 +17,7 @@ use crate::error::TrialError;
 use crate::measurement::measure;
 use crate::own;
 use crate::rig::{Rig, STATE_RATE_HZ};
+use crate::shop::dice::{how_many, log_uniform};
 use crate::size::Deviations;
 use crate::truth::{MEASURE, TrueEffect, Truth};
 
@@ -28,8 +29,6 @@ const LARGE_D_RANGE: [f64; 2] = [20.0, 200.0];
 const SMALL_D: [f64; 2] = [2.0, 40.0];
 /// How near D is to what was drawn where that takes several steps, as a logarithm.
 const NEAR_D: f64 = 0.3;
-/// Shares of machines with none, one and two effects; the rest has three.
-const HOW_MANY: [f64; 3] = [0.2, 0.4, 0.25];
 
 /// A trial before it is measured.
 #[derive(Clone, Debug)]
@@ -171,21 +170,6 @@ const fn range_of(arm: Arm) -> [f64; 2] {
         Arm::Limit => SMALL_D,
         _ => D,
     }
-}
-
-fn how_many(random: &mut Pcg64Mcg) -> usize {
-    let mut left: f64 = random.random();
-    for (count, share) in HOW_MANY.iter().enumerate() {
-        if left < *share {
-            return count;
-        }
-        left -= share;
-    }
-    HOW_MANY.len()
-}
-
-fn log_uniform(random: &mut Pcg64Mcg, [low, high]: [f64; 2]) -> f64 {
-    low * (high / low).powf(random.random())
 }
 
 fn draw(random: &mut Pcg64Mcg, class: Class, is_foreign: bool) -> Hidden {

@@ -1,10 +1,10 @@
-//! Random numbers of a shop.
+//! Random numbers of trials.
 
 use rand::Rng;
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 
-/// Shares of sessions with none, one and two hidden effects; the rest has three.
+/// Shares of trials with none, one and two hidden effects; the rest has three.
 const HOW_MANY: [f64; 3] = [0.2, 0.4, 0.25];
 /// Share of readings that scatter more than the others, and the ratio of the scatters.
 const OUTLYING_SHARE: f64 = 0.1;
@@ -33,7 +33,7 @@ pub fn sign(random: &mut Pcg64Mcg) -> f64 {
     if random.random() { 1.0 } else { -1.0 }
 }
 
-/// How many effects a session hides.
+/// How many effects a trial hides.
 pub fn how_many(random: &mut Pcg64Mcg) -> usize {
     let mut left: f64 = random.random();
     for (count, share) in HOW_MANY.iter().enumerate() {
