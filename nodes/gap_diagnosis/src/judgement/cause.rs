@@ -19,6 +19,7 @@ use crate::judgement::form_doubt;
 use crate::judgement::plain::plainest;
 use crate::judgement::rule::Rule;
 use crate::judgement::unknown::{self, Leftover};
+use crate::judgement::unresolved;
 use crate::judgement::veto::{self, Veto};
 use crate::judgement::{self, Check, CheckId};
 use crate::noise::Noise;
@@ -165,6 +166,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let mut members = veto::judged(scope, &signatures, &normal, &best, &forms, is_closed);
     let thermometers = thermal::notes(stack);
     by_thermometer::check(stack, &signatures, &mut members, &thermometers);
+    unresolved::list_periodic(stack, &signatures, &mut members);
     resize(stack, &signatures, &normal, &mut members);
     while leave_out_small(stack, &signatures, &mut members) {
         resize(stack, &signatures, &normal, &mut members);
