@@ -11,6 +11,7 @@ use crate::config::GapConfig;
 use crate::error::GapError;
 use crate::experiment::Experiment;
 use crate::judgement::along;
+use crate::judgement::by_thermometer;
 use crate::judgement::cause::Found;
 use crate::judgement::guard;
 use crate::judgement::unknown::Leftover;
@@ -467,7 +468,10 @@ pub(crate) fn considered(config: &GapConfig) -> Result<Vec<&'static Kind>, GapEr
     {
         return Err(GapError::LeftOut { id: id.clone() });
     }
-    let kept = |kind: &&&'static Kind| config.left_out.iter().all(|id| id != kind.id);
+    // Only a log asks for what goes with a thermometer (`by_thermometer`).
+    let kept = |kind: &&&'static Kind| {
+        kind.id != by_thermometer::SHIFT && config.left_out.iter().all(|id| id != kind.id)
+    };
     Ok(CATALOGUE.iter().filter(kept).copied().collect())
 }
 

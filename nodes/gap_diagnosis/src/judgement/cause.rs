@@ -140,7 +140,9 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let stack = scope.stack;
     let means = kinds.iter().filter(|kind| kind.moment == Moment::Mean);
     let instances = Instance::all(stack.twin.machine(), means);
-    let instances = Instance::with_begins(instances, scope.begins);
+    let mut instances = Instance::with_begins(instances, scope.begins);
+    let thermometers = thermal::notes(stack);
+    instances.extend(by_thermometer::shifts(scope, &thermometers));
     let mut signatures = Library::new(stack, instances);
     lines::add(stack, scope.slots, &mut signatures);
     widening::widen_curves(stack, &mut signatures);
@@ -164,7 +166,6 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     }
     let forms = isolability::forms(&signatures, &normal, &best.set);
     let mut members = veto::judged(scope, &signatures, &normal, &best, &forms, is_closed);
-    let thermometers = thermal::notes(stack);
     by_thermometer::check(stack, &signatures, &mut members, &thermometers);
     unresolved::list_periodic(stack, &signatures, &mut members);
     resize(stack, &signatures, &normal, &mut members);
