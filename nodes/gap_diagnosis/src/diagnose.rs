@@ -20,6 +20,7 @@ use crate::judgement::{recalibration, unknown};
 use crate::next::{self, Bench};
 use crate::noise::form_error::FormError;
 use crate::noise::stack::Stack;
+use crate::noise::unrepeated;
 use crate::noise::whiteness;
 use crate::noise::{self, Noise, Readings};
 use crate::report::figures::{Figures, Note};
@@ -34,6 +35,7 @@ use crate::search::rows::Rows;
 use crate::search::searched::{Base, Searched, less, told};
 use crate::session::changes::{self, Change};
 use crate::session::fewer::{MIN_STATIONS_KEPT, fewer};
+use crate::session::log;
 use crate::session::over_session;
 use crate::session::thermal_floats::ThermalFloat;
 use crate::shrink::gap;
@@ -264,7 +266,8 @@ impl<'a> Base<'a> {
             inflation,
             ..
         } = searched;
-        let noise_check = guard::judge(&inflation, config, &mut notes);
+        let has_repeats = !(unrepeated::is_assumed(self.noise) && log::is_of_logs(&stack));
+        let noise_check = guard::judge(&inflation, config, has_repeats, &mut notes);
         found.add_check(&noise_check);
         scattered.add_check(&noise_check);
         let reproduced = !noise_check.has_failed();

@@ -38,7 +38,7 @@ pub(crate) const SHIFT: &str = "thermal_shift";
 pub(crate) fn shifts(scope: &Scope<'_, '_>, thermometers: &[Note]) -> Vec<Instance> {
     let stack = scope.stack;
     let is_left_out = scope.config.left_out.iter().any(|id| id == SHIFT);
-    let Some(kind) = effects::kind(SHIFT).filter(|_| !is_left_out && is_of_logs(stack)) else {
+    let Some(kind) = effects::kind(SHIFT).filter(|_| !is_left_out && log::is_of_logs(stack)) else {
         return vec![];
     };
     let reads_z = |channel: &str| channel.ends_with('Z');
@@ -66,12 +66,6 @@ pub(crate) fn shifts(scope: &Scope<'_, '_>, thermometers: &[Note]) -> Vec<Instan
         .collect()
 }
 
-/// Whether all that was read are logs.
-fn is_of_logs(stack: &Stack<'_>) -> bool {
-    let mut runs = stack.rows.blocks.iter().map(|block| block.run);
-    runs.all(|run| log::is_log(&stack.session.runs[run]))
-}
-
 /// Adds the check to the members of a session of logs that go with thermometers.
 pub(crate) fn check(
     stack: &Stack<'_>,
@@ -79,7 +73,7 @@ pub(crate) fn check(
     members: &mut [Member],
     thermometers: &[Note],
 ) {
-    if !is_of_logs(stack) {
+    if !log::is_of_logs(stack) {
         return;
     }
     for member in members {
