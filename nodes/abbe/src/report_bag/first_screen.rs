@@ -267,7 +267,7 @@ fn lacks(tests: &Tests, sections: &[Section], stated: bool) -> Vec<String> {
         lacks.push("The bag holds no test that can be evaluated.".to_owned());
     } else if !stated {
         lacks.push(
-            "No budget (--budget): expanded uncertainties of ISO 230-2, -4 and -6 are not stated."
+            "No budget (--budget): expanded uncertainties of ISO 230-2, 230-4 and 230-6 are not stated."
                 .to_owned(),
         );
     }

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use abbe_msgs::{Defect, Message, Wire, WireError, from_cdr, topics};
 use metrology::Axis;
+use metrology::epoch::utc_of_nanos;
 use metrology::sample::{
     AxisCompensation, BlockMeasurement, GeometryModel, PlanStatus, ProbeLatency, ProbedPoint,
     TestKind, TestSegment, ThermalModel,
@@ -303,10 +304,11 @@ impl Evidence {
     /// A sentence for each topic and reason of messages that could not be used.
     pub fn not_used(&self) -> impl Iterator<Item = String> {
         self.undecoded.iter().map(|((topic, defect), it)| {
-            let (n, first_s, what) = (it.messages, it.first.as_secs_f64(), &it.what);
+            let (n, what) = (it.messages, &it.what);
+            let first = utc_of_nanos(it.first.nanos(), 3);
             let reason = defect.words();
             format!(
-                "{topic}: {n} messages could not be used, {reason}: {what} (the first came at {first_s:.3} s)"
+                "{topic}: {n} messages could not be used, {reason}: {what} (the first came at {first})"
             )
         })
     }
@@ -326,6 +328,18 @@ impl Evidence {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_message_that_cannot_be_used_came_at_a_date() {
+        let mut evidence = Evidence::default();
+        let at = Stamp::from_nanos(1_700_003_585_250_000_000);
+        evidence.message(topics::LATENCY.name, at, &[0, 1]);
+        let line: String = evidence.not_used().collect();
+        assert!(
+            line.ends_with("(the first came at 2023-11-14 23:13:05.250 UTC)"),
+            "{line}"
+        );
+    }
 
     #[test]
     fn what_a_program_waits_for_is_named_until_it_goes_on() {

@@ -3,6 +3,8 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use metrology::visible::visible;
 
+use super::minus::page_with_minus_signs;
+
 const STYLE: &str = "
 :root { color-scheme: light dark; --ink: #1b1f24; --paper: #ffffff; --rule: #d0d7de; --soft: #57606a; --good: #116329; --bad: #a40e26; --c0: #0072b2; --c1: #d55e00; --c2: #009e73; --c3: #cc79a7; --c4: #4aa3d8; --c5: #b07a00; }
 @media (prefers-color-scheme: dark) { :root { --ink: #e6edf3; --paper: #0d1117; --rule: #30363d; --soft: #9198a1; --good: #56d364; --bad: #ff7b72; --c0: #56b4e9; --c1: #f0873a; --c2: #2dc497; --c3: #e3a1c6; --c4: #9bd3f5; --c5: #e6b94f; } }
@@ -45,7 +47,7 @@ pub fn page(title: &str, body: &Markup) -> String {
     }
     .into_string();
     // Marks of direction and control characters of names and texts from outside would show another page.
-    visible(&page).into_owned()
+    page_with_minus_signs(&visible(&page))
 }
 
 /// Characters beyond which a cell is a sentence.
