@@ -15,7 +15,7 @@ th, td { padding: .25rem .8rem .25rem 0; border-bottom: 1px solid var(--rule); t
 th:first-child, td:first-child { text-align: left; } th { color: var(--soft); font-weight: 600; white-space: normal; }
 th.prose, td.prose { text-align: left; white-space: normal; min-width: 10rem; }
 .plot { width: 100%; height: auto; fill: currentColor; overflow: visible; } .polar { max-width: 34rem; display: block; } .plot text { font: 15px system-ui, sans-serif; stroke: none; } .plot .ring { font-size: 13px; paint-order: stroke; stroke: var(--paper); stroke-width: 4px; }
-.three .plot text { font-size: 13px; } .bars .ring { font-size: 15px; stroke: none; } .plot .halo { paint-order: stroke; stroke: var(--paper); stroke-width: 4px; } .note { color: var(--soft); font-size: .9rem; } .good { color: var(--good); } .bad { color: var(--bad); }
+.three .plot text { font-size: 13px; } .bars .ring { font-size: 15px; stroke: none; } .note { color: var(--soft); font-size: .9rem; } .good { color: var(--good); } .bad { color: var(--bad); }
 .c0 { color: var(--c0); } .c1 { color: var(--c1); } .c2 { color: var(--c2); } .c3 { color: var(--c3); } .c4 { color: var(--c4); } .c5 { color: var(--c5); }
 .three { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 16rem), 1fr)); gap: 0 .8rem; } .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 24rem), 1fr)); gap: 0 1.2rem; align-items: start; } .bars { max-width: 36rem; display: block; }
 figure { margin: .8rem 0; break-inside: avoid; } .legend { display: flex; flex-wrap: wrap; gap: 0 1rem; font-size: .9rem; } .legend .of { font-weight: 600; }

@@ -292,8 +292,8 @@ mod tests {
         assert_eq!(text.matches("10 µm of error</text>").count(), 3, "{text}");
         let number = |after: &str, mark: &str| -> f64 {
             let digits = after.split(mark).nth(1).unwrap();
-            let digits = digits.split(|c: char| !"0123456789.-".contains(c));
-            digits.clone().next().unwrap().parse().unwrap()
+            let mut digits = digits.split(|c: char| !"0123456789.-".contains(c));
+            digits.next().unwrap().parse().unwrap()
         };
         let bar = text.split("class=\"scale\"").nth(1).unwrap();
         let bar = bar.split(" d=\"").nth(1).unwrap();
