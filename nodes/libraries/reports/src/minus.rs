@@ -91,7 +91,10 @@ mod tests {
             ("a = -4, b:-1", "a = −4, b:−1"),
             ("± 3; −2", "± 3; −2"),
             ("ISO 230-2 and 2026-01-05", "ISO 230-2 and 2026-01-05"),
-            ("runs/x-1 X-2 1e-5 well-known", "runs/x-1 X-2 1e-5 well-known"),
+            (
+                "runs/x-1 X-2 1e-5 well-known",
+                "runs/x-1 X-2 1e-5 well-known",
+            ),
             ("give --sign -1", "give --sign -1"),
             ("- item -x", "- item -x"),
         ] {

@@ -298,11 +298,19 @@ mod tests {
         let bar = text.split("class=\"scale\"").nth(1).unwrap();
         let bar = bar.split(" d=\"").nth(1).unwrap();
         let bar_px = number(bar, "H") - number(bar, "M");
-        let arrow = text.split("<path stroke-width=\"1.6\" d=\"").nth(1).unwrap();
+        let arrow = text
+            .split("<path stroke-width=\"1.6\" d=\"")
+            .nth(1)
+            .unwrap();
         // An arrow of 12 µm along X, of which the bar is 10.
         let wanted_px = number(arrow, "l") * 10.0 / 12.0;
         assert!((bar_px - wanted_px).abs() < 0.2, "{bar_px} {wanted_px}");
-        for (mm, words) in [(0.02, "20"), (0.0005, "0.5"), (0.00002, "0.02"), (0.1, "100")] {
+        for (mm, words) in [
+            (0.02, "20"),
+            (0.0005, "0.5"),
+            (0.00002, "0.02"),
+            (0.1, "100"),
+        ] {
             assert_eq!(length_um(mm), words);
         }
     }

@@ -198,7 +198,12 @@ fn floor_line(text: &mut String, at: f64, rows: usize) -> std::fmt::Result {
     let [top, bottom] = BAR_EDGES_PX;
     for row in 0..rows {
         let y = row as f64 * ROW_PX;
-        write!(text, "M{at:.1} {:.1}V{:.1}", y + top - 2.0, y + bottom + 4.0)?;
+        write!(
+            text,
+            "M{at:.1} {:.1}V{:.1}",
+            y + top - 2.0,
+            y + bottom + 4.0
+        )?;
     }
     text.push_str("\"/></g>");
     Ok(())
@@ -244,7 +249,13 @@ mod tests {
     fn the_floor_crosses_bars_and_no_name() {
         let text = drawn(&bars(5.0, 3.0, &[("a".to_owned(), 1.0)]), 0.4).unwrap();
         let dashed = text.split("stroke-dasharray").nth(1).unwrap();
-        let path = dashed.split("d=\"").nth(1).unwrap().split('"').next().unwrap();
+        let path = dashed
+            .split("d=\"")
+            .nth(1)
+            .unwrap()
+            .split('"')
+            .next()
+            .unwrap();
         let stretches: Vec<(f64, f64)> = { path.split('M').skip(1) }
             .map(|one| {
                 let (top, bottom) = one.split_once(' ').unwrap().1.split_once('V').unwrap();

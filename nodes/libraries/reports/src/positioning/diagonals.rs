@@ -18,8 +18,7 @@ use crate::terminal::Rank;
 /// Begin of the title of a test along a diagonal.
 pub(super) const DIAGONAL: &str = "Diagonal ";
 /// What the letters of a space diagonal mean.
-const LETTERS: &str =
-    "PPP, NPP, PNP and PPN: whether X, Y and Z run in the positive (P) or negative (N) direction from the lower end to the upper.";
+const LETTERS: &str = "PPP, NPP, PNP and PPN: whether X, Y and Z run in the positive (P) or negative (N) direction from the lower end to the upper.";
 
 /// The space diagonal along which a test ran, and whether it ran it upwards.
 fn space_diagonal(test: &LinearTest) -> Option<(SpaceDiagonal, bool)> {
@@ -50,7 +49,9 @@ pub fn shown_title(title: &str) -> String {
         all.find(|name| name.eq_ignore_ascii_case(letters))
     };
     let is_whole = |rest: &str| !rest.starts_with(char::is_alphanumeric);
-    let behind = title.get(DIAGONAL.len() + 3..).filter(|rest| is_whole(rest));
+    let behind = title
+        .get(DIAGONAL.len() + 3..)
+        .filter(|rest| is_whole(rest));
     match (letters.and_then(named), behind) {
         (Some(name), Some(behind)) => format!("{DIAGONAL}{name}{behind}"),
         _ => title.to_owned(),
@@ -286,7 +287,10 @@ mod tests {
     #[test]
     fn letters_of_a_diagonal_are_capitals_and_another_name_of_its_beam_stays() {
         for (title, shown) in [
-            ("Diagonal npp, run 8 on: by the laser", "Diagonal NPP, run 8 on: by the laser"),
+            (
+                "Diagonal npp, run 8 on: by the laser",
+                "Diagonal NPP, run 8 on: by the laser",
+            ),
             ("Diagonal PPN: by the laser", "Diagonal PPN: by the laser"),
             ("Diagonal pppx, run 8 on", "Diagonal pppx, run 8 on"),
             ("Diagonal d1, run 8 on", "Diagonal d1, run 8 on"),

@@ -194,7 +194,10 @@ fn in_words(name: &str) -> String {
     let own = own.strip_prefix("figures.").unwrap_or(own);
     let own = own.replace(['_', '.'], " ");
     let mut parts = family.split('_');
-    match (parts.next().and_then(|first| first.strip_prefix("iso")), parts.next()) {
+    match (
+        parts.next().and_then(|first| first.strip_prefix("iso")),
+        parts.next(),
+    ) {
         (Some(norm), Some(part)) => format!("{own}{BEFORE_STANDARD}{norm}-{part}"),
         _ => own,
     }
