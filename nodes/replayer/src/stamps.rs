@@ -21,7 +21,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use abbe_msgs::Durability;
 use abbe_msgs::topics::Entry;
 use metrology::epoch::utc_of_nanos;
-use metrology::stamp::{Host, NANOS_PER_S, Span, Stamp};
+use metrology::stamp::{NANOS_PER_S, Span};
 use recorder::{Bag, Event, MessageRef, Order, TopicId};
 
 use crate::known::entry_in_any_namespace;

@@ -198,8 +198,14 @@ impl Wanted<'_> {
             "Written: {} (begin with {INSTRUCTIONS}).",
             self.out.display()
         ));
-        let title = format!("Designed programme: {}", self.out.display());
-        let page = designed::page(&title, &designed.design, order_of(&stands), &notes)?;
+        let title = format!(
+            "Designed programme for {}: {} min",
+            machine.name,
+            number(self.minutes)
+        );
+        let mut page = designed::page(&title, &designed.design, order_of(&stands), &notes)?;
+        let folder = self.out.display().to_string();
+        page.screen.made = Some(foreseen_now(&machine.name, &folder));
         if let Some(path) = self.html {
             whole_file::write(path, &page.html())?;
         }

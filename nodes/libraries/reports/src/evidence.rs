@@ -6,8 +6,8 @@ use abbe_msgs::{Defect, Message, Wire, WireError, from_cdr, topics};
 use metrology::Axis;
 use metrology::epoch::utc_of_nanos;
 use metrology::sample::{
-    AxisCompensation, BlockMeasurement, GeometryModel, PlanStatus, ProbeLatency, ProbedPoint,
-    TestKind, TestSegment, ThermalModel,
+    AxisCompensation, BlockMeasurement, GeometryModel, PlanStatus, ProbeLatency, ProbeTrigger,
+    ProbedPoint, TestKind, TestSegment, ThermalModel,
 };
 use metrology::stamp::{Host, Stamp};
 use nalgebra::Vector3;
@@ -112,8 +112,12 @@ pub struct Evidence {
     pub start_up: StartUp,
     /// Verifications with the plant's truth.
     pub verifications: Vec<Verification>,
-    /// The plant's latency, s.
+    /// Touches of latency runs as the control latched them, each with the run it belongs to.
+    pub latched: Vec<(u32, ProbeTrigger)>,
+    /// The latency that the simulated probe has, s.
     pub true_latency_s: Option<f64>,
+    /// Where the true latency is stated, where that is not the plant.
+    pub true_latency_source: Option<String>,
     /// Messages that could not be used, by topic and reason.
     pub undecoded: BTreeMap<(String, Defect), Undecoded>,
 }
@@ -135,6 +139,7 @@ impl Evidence {
         [
             topics::LATENCY.name,
             topics::PROBE_POINT.name,
+            topics::PROBE_TRIGGER.name,
             topics::BLOCKS_MEASUREMENT.name,
             topics::THERMAL_MODEL.name,
             topics::GEOMETRY_ROTARY.name,
@@ -157,6 +162,13 @@ impl Evidence {
                 self.start_up.work();
             }
             self.points.extend(taken.map(|point| (run, point)));
+        } else if topic == topics::PROBE_TRIGGER.name {
+            let run = self.current_run();
+            let is_of_latency = |segment: &TestSegment| segment.kind == TestKind::Latency;
+            if self.segments.last().is_some_and(is_of_latency) {
+                let taken = self.decode(&topics::PROBE_TRIGGER, (at, bytes));
+                self.latched.extend(taken.map(|touch| (run, touch)));
+            }
         } else if topic == topics::BLOCKS_MEASUREMENT.name {
             let taken = self.decode(&topics::BLOCKS_MEASUREMENT, (at, bytes));
             self.blocks.extend(taken);

@@ -14,7 +14,18 @@ fn belongs_to_a_word(before: char) -> bool {
     before.is_alphanumeric() || "-_/\\.%+".contains(before)
 }
 
-/// Whether the hyphen between these texts is the sign of a number; one behind an option such as `--sign` is copied.
+/// Whether the hyphen between these texts is the sense of an axis, as in `X-` and `-X`.
+fn is_sense(before: &str, after: &str) -> bool {
+    let is_axis = |c: char| "XYZABC".contains(c);
+    let ends = |c: Option<char>| c.is_none_or(|c| !c.is_alphanumeric() && c != '-');
+    let (mut left, mut right) = (before.chars().rev(), after.chars());
+    let (near, next) = (left.next(), right.next());
+    let is_behind = near.is_some_and(is_axis) && ends(left.next()) && ends(next);
+    let is_ahead = next.is_some_and(is_axis) && ends(right.next()) && ends(near);
+    is_behind || is_ahead
+}
+
+/// Whether the hyphen between these texts is the sign of a number or of an axis; one behind an option such as `--sign` is copied.
 fn is_sign(before: &str, after: &str) -> bool {
     let mut letters = after.chars();
     let is_number = match letters.next() {
@@ -23,7 +34,8 @@ fn is_sign(before: &str, after: &str) -> bool {
     };
     let is_of_word = before.chars().next_back().is_some_and(belongs_to_a_word);
     let word = before.split_whitespace().next_back();
-    is_number && !is_of_word && !word.is_some_and(|word| word.starts_with("--"))
+    let is_number = is_number && !is_of_word;
+    (is_number || is_sense(before, after)) && !word.is_some_and(|word| word.starts_with("--"))
 }
 
 /// A text with minus signs.
@@ -97,6 +109,9 @@ mod tests {
             ),
             ("give --sign -1", "give --sign -1"),
             ("- item -x", "- item -x"),
+            ("backlash X- 3.99", "backlash X− 3.99"),
+            ("corner -X +Y, -Y", "corner −X +Y, −Y"),
+            ("X-Y, X-ray, -Xx, 3-A", "X-Y, X-ray, -Xx, 3-A"),
         ] {
             assert_eq!(with_minus_signs(text), wanted);
         }

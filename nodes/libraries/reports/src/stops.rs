@@ -15,6 +15,7 @@ use anyhow::Result;
 
 use super::plot::{self, Plot, Trace};
 use super::section::{Drawing, Rows, Section, head, um};
+use super::svg::unsigned_zero;
 use crate::evaluate::stops::{SAME_MM, Stop, Stops};
 
 /// Of the stops of a direction each so-manyth is in the table that is tried.
@@ -87,7 +88,7 @@ fn row(stops: &Stops) -> Vec<String> {
         um(deviations().map(f64::abs).fold(0.0, f64::max)),
         um(side(true)),
         um(side(false)),
-        format!("{:.1}", slope(&stops.stops) * 1e6),
+        um_per_m(slope(&stops.stops)),
         if stops.by_scale {
             "linear scale"
         } else {
@@ -113,6 +114,10 @@ fn p95(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Of a straight line through all stops, mm/mm.
+fn um_per_m(slope: f64) -> String {
+    unsigned_zero(format!("{:.1}", slope * 1e6))
+}
+
 fn slope(stops: &[Stop]) -> f64 {
     let at = mean(stops.iter().map(|stop| stop.commanded_mm));
     let with = |value: fn(&Stop) -> f64| -> f64 {
@@ -163,7 +168,7 @@ pub fn trial(title: &str, runs: &[(&str, &Stops)]) -> Result<Section> {
             um(left.p95_between_mm),
             um(left.rms_mm),
             format!("{:.3}", left.rms_mm / bare_mm),
-            format!("{:.1}", slope(&stops.stops) * 1e6),
+            um_per_m(slope(&stops.stops)),
         ]
     });
     let mut section = Section::new(title);
