@@ -179,7 +179,7 @@ impl ReportBag {
         };
         let of = (machine, tests.conditions.nanos(), self.bag.as_path());
         let alarms = self.keep.judge_report(limits, &report.figures, of)?;
-        report.add("alarms", &alarms.section());
+        alarms.add_to(&mut report);
         Ok((report, Some(alarms)))
     }
 

@@ -319,7 +319,7 @@ impl Run {
         let machine = Origin::of_run(bag, &scenario.folder.join("machine.yaml"))?.machine;
         let of = (machine.as_deref(), between, bag);
         let alarms = self.keep.judge_report(limits, &report.figures, of)?;
-        report.add("alarms", &alarms.section());
+        alarms.add_to(report);
         Ok(Some(alarms))
     }
 
