@@ -331,9 +331,9 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
         lines.push(TICKS_SHARE.to_owned());
     }
     let body = html! {
-        @for line in &lines { p { (line) } }
         (super::feeds::section(evidence))
         (section(evidence)?)
+        @if !evidence.latencies.is_empty() { p.note { (TICKS_SHARE) } }
         (super::blocks::section(evidence))
     };
     let mut screen = screen(evidence)?;
