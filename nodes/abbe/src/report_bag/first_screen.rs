@@ -147,6 +147,10 @@ fn picture(shown: &[&Section], sections: &[Section]) -> Option<Markup> {
         let caption = format!("{}. {}", one.title, drawing.caption);
         figure(&drawing.svg, &caption)
     });
+    // The temperatures of a logged drift are drawn behind it.
+    let meanwhile = section.drawings.get(1);
+    let meanwhile = meanwhile.filter(|_| !section.figures["iso230_3_log"].is_null());
+    let beside = beside.or_else(|| Some(figure(&meanwhile?.svg, &meanwhile?.caption)));
     Some(match beside {
         Some(beside) => html! { div.pair { (first) (beside) } },
         None => first,

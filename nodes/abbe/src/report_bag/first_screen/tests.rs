@@ -142,6 +142,23 @@ fn figures_beyond_their_limits_come_first_beside_them() {
 }
 
 #[test]
+fn the_temperatures_of_a_logged_drift_stand_beside_it() {
+    let mut drift = section("Thermal drift of Z", "range 3.00 µm.", Rank::Table);
+    let drawing = |caption: &str| reports::section::Drawing {
+        svg: String::new(),
+        caption: caption.to_owned(),
+    };
+    drift.drawings = vec![drawing("Displacement."), drawing("Temperatures.")];
+    let shown = |drift: &Section| {
+        let screen = of(&Tests::default(), std::slice::from_ref(drift), None, true);
+        screen.picture.unwrap().into_string()
+    };
+    assert!(!shown(&drift).contains("Temperatures."));
+    drift.figures = serde_json::json!({"iso230_3_log": {"figures": {}}});
+    assert!(shown(&drift).contains("Temperatures."));
+}
+
+#[test]
 fn a_test_that_stands_alone_has_a_tile_for_each_of_its_figures() {
     let shown = |answer: &str| {
         let one = section("Positioning X, run 1 on: laser", answer, Rank::Table);
