@@ -33,8 +33,7 @@ use folder::{Contents, INSTRUCTIONS, Setting};
 use instruments::Shop;
 use menu::Offer;
 
-use super::dry_run;
-use super::programme;
+use super::{dry_run, foreseen_now, programme};
 use crate::tell::tell;
 use crate::usage::refused;
 use crate::validate;

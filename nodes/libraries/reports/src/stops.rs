@@ -113,11 +113,12 @@ fn p95(values: impl Iterator<Item = f64>) -> f64 {
         .unwrap_or(f64::NAN)
 }
 
-/// Of a straight line through all stops, mm/mm.
+/// A slope in µm/m, a zero without a sign.
 fn um_per_m(slope: f64) -> String {
     unsigned_zero(format!("{:.1}", slope * 1e6))
 }
 
+/// Of a straight line through all stops, mm/mm.
 fn slope(stops: &[Stop]) -> f64 {
     let at = mean(stops.iter().map(|stop| stop.commanded_mm));
     let with = |value: fn(&Stop) -> f64| -> f64 {
@@ -307,6 +308,7 @@ mod tests {
         assert!(after < 1e-9, "{after}");
         assert!((wrong - 2.0 * before).abs() < 1e-9 && before > 10.0);
         assert!((slope(&long.stops) - 1e-4).abs() < 1e-12);
+        assert_eq!([um_per_m(-1e-9), um_per_m(-1e-6)], ["0.0", "-1.0"]);
         let section = section(&[long]).unwrap();
         assert!(
             section.terminal().contains("100.0"),

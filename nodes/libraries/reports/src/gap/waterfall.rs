@@ -132,7 +132,7 @@ fn drawn(bars: &[Bar], floor_um: f64) -> Result<String, std::fmt::Error> {
     };
     let floor = format!("noise floor {} µm", size(floor_um));
     let title = "rms of machine minus simulator / µm";
-    let mut text = legend(title, &[(FLOOR_COLOUR, "line dashed", &floor)]);
+    let mut text = legend(title, &[(FLOOR_COLOUR, "line dashed", floor.as_str())]);
     write!(
         text,
         "<svg class=\"plot\" role=\"img\" aria-label=\"waterfall of the gap\" viewBox=\"0 0 {WATERFALL_WIDTH} {height}\">"
