@@ -8,7 +8,7 @@ use reports::evaluate::limits::CONFORMS;
 use reports::loss;
 use reports::page::figure;
 use reports::screen::{Screen, Tile, Tone};
-use reports::section::{Section, capitalised};
+use reports::section::{Section, capitalised, um};
 use reports::terminal::Rank;
 
 /// What a verdict without limits says.
@@ -48,6 +48,7 @@ pub(super) fn of(
     };
     let mut all = judged.map(judged_tiles).unwrap_or_default();
     all.extend(tiles);
+    all.extend(shown.first().and_then(|first| range(first, sections)));
     Screen {
         verdict: verdict(tests, (&shown, sections), judged),
         tiles: all,
@@ -103,6 +104,18 @@ fn rivals<'s>(
     all: impl Iterator<Item = &'s Section>,
 ) -> impl Iterator<Item = &'s Section> {
     all.filter(|other| kind_of(other) == kind_of(one) && size_mm(other).is_some())
+}
+
+/// The least and the greatest of the circles or drifts of one kind, where there are several.
+fn range(first: &Section, sections: &[Section]) -> Option<Tile> {
+    size_mm(first)?;
+    let sizes_mm: Vec<f64> = rivals(first, sections.iter()).filter_map(size_mm).collect();
+    let n = sizes_mm.len();
+    let least_mm = sizes_mm.iter().copied().fold(f64::INFINITY, f64::min);
+    let greatest_mm = sizes_mm.iter().copied().fold(0.0, f64::max);
+    let value = format!("{} to {} µm", um(least_mm), um(greatest_mm));
+    let more = "least and greatest of its kind; run by run below";
+    (n > 1).then(|| Tile::new(&format!("all {n}"), value, more))
 }
 
 fn is_of_circles(section: &Section) -> bool {

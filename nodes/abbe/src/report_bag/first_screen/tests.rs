@@ -86,7 +86,8 @@ fn the_worst_circle_of_a_plane_and_its_largest_cause_come_first() {
         [
             "Circle XY, R 50.000 mm, 6000 mm/min, runs 9 and 10",
             "largest cause in XY",
-            "Geometric errors"
+            "Geometric errors",
+            "all 2"
         ]
     );
 }
@@ -245,7 +246,8 @@ fn the_greatest_of_several_drifts_is_the_verdict_and_like_warnings_are_one() {
         screen.verdict.unwrap().0,
         "Thermal drift of Z, run 2, ISO 230-3, cause not stated: range 24.20 µm; the greatest of 3. Not judged: no limits were given."
     );
-    assert_eq!(screen.tiles.len(), 1);
+    assert_eq!(screen.tiles.len(), 2);
+    assert_eq!(screen.tiles[1].value, "23.20 to 24.20 µm");
     assert_eq!(
         screen.lacks,
         ["Thermal drift of Z, run 1, ISO 230-3 and 2 more: Recorded for 1.00 h."]
