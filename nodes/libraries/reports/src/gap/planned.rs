@@ -212,7 +212,7 @@ fn picture(forecast: &Preflight) -> Option<Markup> {
     let mut worst: Vec<&Foreseen> = Vec::new();
     for effect in &forecast.effects {
         match worst.iter_mut().find(|one| one.effect == effect.effect) {
-            Some(one) if share(*one) < share(effect) => *one = effect,
+            Some(one) if share(one) < share(effect) => *one = effect,
             Some(_) => {}
             None => worst.push(effect),
         }
