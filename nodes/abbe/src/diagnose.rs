@@ -182,7 +182,7 @@ impl Diagnose {
         let judge = |limits: Limits| self.keep.judge_diagnosis(limits, &json, of);
         let alarms = limits.map(judge).transpose()?;
         if let Some(alarms) = &alarms {
-            page.add("alarms", &alarms.section());
+            alarms.add_to(page);
             json["alarms"] = alarms.json();
         }
         Ok((serde_json::to_string_pretty(&json)?, alarms))

@@ -42,7 +42,7 @@ pub struct ReportBag {
     /// Which column of the table is what, as `abbe import` takes it.
     #[arg(long)]
     map: Option<PathBuf>,
-    /// What is not known about the measurements: the expanded uncertainties of ISO 230-2, -4 and -6 come from it and are not
+    /// What is not known about the measurements: the expanded uncertainties of ISO 230-2, 230-4 and 230-6 come from it and are not
     /// stated without it. What fits say of themselves (geometric errors, causes of circles) is stated in any case.
     #[arg(long)]
     budget: Option<PathBuf>,
@@ -179,7 +179,7 @@ impl ReportBag {
         };
         let of = (machine, tests.conditions.nanos(), self.bag.as_path());
         let alarms = self.keep.judge_report(limits, &report.figures, of)?;
-        report.add("alarms", &alarms.section());
+        alarms.add_to(&mut report);
         Ok((report, Some(alarms)))
     }
 
@@ -350,7 +350,7 @@ fn uncertainty(stated: bool) -> serde_json::Value {
     } else {
         serde_json::json!({
             "stated": false,
-            "reason": "no budget was given (--budget): the expanded uncertainties of ISO 230-2, -4 and -6 are null; standard uncertainties are those of fits, which need none",
+            "reason": "no budget was given (--budget): the expanded uncertainties of ISO 230-2, 230-4 and 230-6 are null; standard uncertainties are those of fits, which need none",
         })
     }
 }
@@ -456,7 +456,7 @@ mod tests {
         assert_eq!(report.figures["uncertainty"]["stated"], false);
         let reason = report.figures["uncertainty"]["reason"].as_str().unwrap();
         assert!(reason.contains("--budget"), "{reason}");
-        assert!(reason.contains("ISO 230-2, -4 and -6"), "{reason}");
+        assert!(reason.contains("ISO 230-2, 230-4 and 230-6"), "{reason}");
         assert!(reason.contains("those of fits"), "{reason}");
     }
 }

@@ -40,6 +40,7 @@ mod live;
 mod mirror;
 mod serve;
 mod shortcomings;
+mod simulated_latency;
 mod table_trial;
 mod unwritten;
 
@@ -230,6 +231,7 @@ impl Run {
             complain!("abbe: the end was forced: no page was written");
             return Ok(ExitCode::FAILURE);
         }
+        simulated_latency::state(&mut outcome.evidence, scenario);
         let title = format!("{}: {}", scenario.name, scenario.file.title);
         let mut report = Report::of(scenario.file.report, &title, &outcome.evidence)?;
         let mut between = None;
@@ -317,7 +319,7 @@ impl Run {
         let machine = Origin::of_run(bag, &scenario.folder.join("machine.yaml"))?.machine;
         let of = (machine.as_deref(), between, bag);
         let alarms = self.keep.judge_report(limits, &report.figures, of)?;
-        report.add("alarms", &alarms.section());
+        alarms.add_to(report);
         Ok(Some(alarms))
     }
 

@@ -20,11 +20,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use abbe_msgs::Durability;
 use abbe_msgs::topics::Entry;
-use metrology::stamp::{Host, NANOS_PER_S, Span, Stamp};
+use metrology::epoch::utc_of_nanos;
+use metrology::stamp::{NANOS_PER_S, Span};
 use recorder::{Bag, Event, MessageRef, Order, TopicId};
 
 use crate::known::entry_in_any_namespace;
 use crate::leap::{self, LEAST};
+use crate::pause::duration;
 use crate::reading::stamp_of;
 
 mod clocks;
@@ -263,12 +265,12 @@ impl WrongStamps {
         let offset = Span::from_nanos(offset_nanos.saturating_abs());
         let way = if offset_nanos < 0 { "earlier" } else { "later" };
         Some(format!(
-            "its stamps are {:.0} s from those of the other topics, {way}: {} to {} s, those {} to {} s; set the clock that stamped it",
-            offset.as_secs_f64(),
-            seconds(first),
-            seconds(last),
-            seconds(from),
-            seconds(to)
+            "its stamps are {} {way} than those of the other topics: {} to {}, those {} to {}; set the clock that stamped it",
+            duration(offset.as_secs_f64()),
+            date(first),
+            date(last),
+            date(from),
+            date(to)
         ))
     }
 
@@ -281,10 +283,10 @@ impl WrongStamps {
         let key = (message.topic.index(), message.log_time_nanos, stamp);
         let limits = self.found.get(&key)?;
         Some(format!(
-            "header.stamp = {} s: must be from {} to {} s by the messages beside it; set the clock that stamped it",
-            seconds(stamp),
-            seconds(limits.low_nanos),
-            seconds(limits.high_nanos)
+            "header.stamp = {}: must be from {} to {} by the messages beside it; set the clock that stamped it",
+            date(stamp),
+            date(limits.low_nanos),
+            date(limits.high_nanos)
         ))
     }
 }
@@ -385,13 +387,12 @@ fn key(message: &MessageRef<'_>, entries: &[Option<&'static Entry>]) -> Option<K
 }
 
 /// A stamp in ns since 1970; its seconds are the bits of an unsigned number.
-fn nanos_of((sec, nanosec): (i32, u32)) -> i64 {
+pub(crate) fn nanos_of((sec, nanosec): (i32, u32)) -> i64 {
     i64::from(sec.cast_unsigned()) * NANOS_PER_S + i64::from(nanosec)
 }
 
-fn seconds(nanos: i64) -> String {
-    let span: Span = Stamp::<Host>::from_nanos(nanos) - Stamp::from_nanos(0);
-    format!("{:.3}", span.as_secs_f64())
+fn date(nanos: i64) -> String {
+    utc_of_nanos(nanos, 3)
 }
 
 #[cfg(test)]

@@ -12,8 +12,10 @@ use history::{
     crossing, since_last_change,
 };
 use node_runtime::{complain, text_file};
+use reports::Report;
 use reports::evaluate::limits::Limits;
 use reports::evaluate::limits::alarms::{Judged, Observed, State};
+use reports::screen::{Tile, Tone};
 use reports::section::{Rows, Section, head};
 use reports::terminal::Rank;
 use serde_json::{Value, json};
@@ -188,12 +190,7 @@ impl Alarms {
     /// For a page.
     pub fn section(&self) -> Section {
         let mut section = Section::new("Limits").ranked(Rank::Answer);
-        let n = self.raised().count();
-        section.answers.push(match (n, self.rows.len()) {
-            (_, 0) => "no figure here has a limit.".to_owned(),
-            (0, all) => format!("none of {all} figures with a limit exceeds it."),
-            (n, all) => format!("ALARM: {n} of {all} figures with a limit exceed it."),
-        });
+        section.answers.push(self.in_short());
         for line in self.lines() {
             section.warn("Alarm", line);
         }
@@ -231,6 +228,38 @@ impl Alarms {
         });
         section.figures = self.json();
         section
+    }
+
+    fn in_short(&self) -> String {
+        match (self.raised().count(), self.rows.len()) {
+            (_, 0) => "no figure here has a limit.".to_owned(),
+            (0, all) => format!("none of {all} figures with a limit exceeds it."),
+            (n, all) => format!("ALARM: {n} of {all} figures with a limit exceed it."),
+        }
+    }
+
+    /// Adds the limits to a report: their part, a tile, and the alarms to its verdict and to what failed.
+    pub fn add_to(&self, report: &mut Report) {
+        report.add("alarms", &self.section());
+        let (n, all) = (self.raised().count(), self.rows.len());
+        if all == 0 {
+            return;
+        }
+        let screen = &mut report.screen;
+        let tile =
+            |value: String| Tile::new("figures with a limit", value, "the table Limits has each");
+        if n == 0 {
+            let tile = tile(format!("{all} of {all} within"));
+            screen.tiles.insert(0, tile.toned(Tone::Good));
+            return;
+        }
+        let tile = tile(format!("{n} of {all} exceed it"));
+        screen.tiles.insert(0, tile.toned(Tone::Bad));
+        screen.lacks.splice(0..0, self.lines());
+        if let Some((sentence, tone)) = &mut screen.verdict {
+            *sentence = format!("{} {sentence}", self.in_short());
+            *tone = Tone::Bad;
+        }
     }
 
     /// For machines.
@@ -402,6 +431,8 @@ fn expected(judged: &Judged, points: &[Point]) -> String {
 #[cfg(test)]
 mod tests {
     use history::{Entry, Kind, Options};
+    use reports::ReportKind;
+    use reports::evidence::Evidence;
 
     use super::*;
 
@@ -456,6 +487,14 @@ mod tests {
             let text = alarms.section().terminal();
             assert_eq!(text.contains("ALARM: m: "), is_alarm, "{text}");
             assert!(text.contains("≤ 10.00 µm"), "{text}");
+            let mut report = Report::of(ReportKind::Tests, "t", &Evidence::default()).unwrap();
+            report.screen.verdict = Some(("Smaller.".to_owned(), Tone::Good));
+            alarms.add_to(&mut report);
+            let (verdict, tone) = report.screen.verdict.clone().unwrap();
+            assert_eq!(verdict.starts_with("ALARM: 1 of 1 "), is_alarm, "{verdict}");
+            assert_eq!(tone == Tone::Bad, is_alarm);
+            assert_eq!(report.screen.tiles[0].tone == Tone::Bad, is_alarm);
+            assert_eq!(report.screen.lacks.len(), usize::from(is_alarm));
         }
     }
 

@@ -79,7 +79,7 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
     section
 }
 
-/// The largest known shift, or turn where no shift is known, at the end of its span, with U; and where.
+/// The largest known shift, or turn where no shift is known, at the end of its span, with U; and what it is.
 fn largest(known: &[&Coefficient]) -> Option<(String, String)> {
     let of = |is_angular: bool| {
         let own = { known.iter() }.filter(move |c| c.curve.component.is_angular() == is_angular);
@@ -87,20 +87,23 @@ fn largest(known: &[&Coefficient]) -> Option<(String, String)> {
             .max_by(|a, b| a.at_end().abs().total_cmp(&b.at_end().abs()))
     };
     let largest = of(false).or_else(|| of(true))?;
-    let row = largest.row();
-    let [name, value, u, span] = row.as_slice() else {
-        return None;
-    };
-    let (number, unit) = value.split_once(' ')?;
-    let name_alone = name.split(' ').next().unwrap_or(name);
-    let place = match name.split_once(" at ") {
-        Some((_, at)) => format!("at {at} {}", largest.unit_of_place()),
-        None => format!("at the end of {span}"),
-    };
+    let (value, u) = largest.at_end_with_u();
+    let component = largest.curve.component;
     Some((
-        format!("{name_alone} {number} ± {u} {unit}"),
-        format!("{place}, k = 2"),
+        format!("{component} {value} ± {u} {}", unit(component)),
+        format!("{}; k = 2", largest.in_words()),
     ))
+}
+
+/// A part of a polynomial by its power.
+fn of_degree(power: u8) -> String {
+    match power {
+        0 => "constant part".to_owned(),
+        1 => "linear part".to_owned(),
+        2 => "quadratic part".to_owned(),
+        3 => "cubic part".to_owned(),
+        n => format!("part of degree {n}"),
+    }
 }
 
 /// A sentence for the sign of each squareness among components; none without one.
@@ -357,18 +360,40 @@ impl Coefficient<'_> {
         values.get(self.place).copied().unwrap_or(f64::NAN) * factor
     }
 
-    fn unit_of_place(&self) -> &'static str {
-        if self.curve.component.of.is_linear() {
-            "mm"
-        } else {
-            "rad"
+    /// What it is, and where: `cubic part (coefficient ECY3) of the rotation of Y about Z, at the end of Y 0 to 300 mm`.
+    fn in_words(&self) -> String {
+        let component = self.curve.component;
+        let (what, axis) = (component.in_words(), component.of);
+        match self.curve.form {
+            CurveForm::Constant => what,
+            CurveForm::Polynomial => format!(
+                "{} (coefficient {}) of the {what}, at the end of {}",
+                of_degree(self.power()),
+                self.name(),
+                self.span()
+            ),
+            CurveForm::Table => {
+                let at = self.curve.position.get(self.place);
+                let at = at.copied().unwrap_or(f64::NAN);
+                let at = if axis.is_linear() {
+                    format!("{at:.1} mm")
+                } else {
+                    format!("{:.1}°", at.to_degrees())
+                };
+                format!("{what}, at {axis} = {at}")
+            }
         }
+    }
+
+    /// Value at the end of the span and its U, µm or µrad.
+    fn at_end_with_u(&self) -> (String, String) {
+        let u = COVERAGE * self.times_reach(&self.curve.standard_uncertainty);
+        rounded(self.at_end(), u)
     }
 
     fn row(&self) -> Vec<String> {
         let component = self.curve.component;
-        let u = COVERAGE * self.times_reach(&self.curve.standard_uncertainty);
-        let (value, u) = rounded(self.at_end(), u);
+        let (value, u) = self.at_end_with_u();
         vec![
             self.name(),
             format!("{value} {}", unit(component)),
@@ -438,4 +463,54 @@ pub fn tables(tables: &[PositioningTable]) -> Option<Section> {
         });
     }
     Some(section)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve(name: &str, form: CurveForm) -> ErrorCurve {
+        ErrorCurve {
+            component: name.parse().unwrap(),
+            form,
+            origin: 0.0,
+            power: vec![3],
+            position: vec![-126.0],
+            coefficient: vec![1e-12],
+            standard_uncertainty: vec![1e-14],
+            estimable: vec![true],
+            span: (0.0, 300.0),
+        }
+    }
+
+    #[test]
+    fn the_largest_coefficient_is_named_by_its_part_its_error_and_its_place() {
+        for (name, form, wanted) in [
+            (
+                "ECY",
+                CurveForm::Polynomial,
+                "cubic part (coefficient ECY3) of the rotation of Y about Z, at the end of Y 0 to 300 mm; k = 2",
+            ),
+            ("EC0Y", CurveForm::Constant, "squareness of Y to X; k = 2"),
+            (
+                "EXY",
+                CurveForm::Table,
+                "straightness of Y along X, at Y = -126.0 mm; k = 2",
+            ),
+        ] {
+            let curve = curve(name, form);
+            let known = Coefficient {
+                curve: &curve,
+                place: 0,
+            };
+            assert_eq!(largest(&[&known]).unwrap().1, wanted);
+        }
+        let curve = curve("ECY", CurveForm::Polynomial);
+        let known = Coefficient {
+            curve: &curve,
+            place: 0,
+        };
+        // By hand: 1e-12 rad/mm^3 * (300 mm)^3 = 27 µrad, twice 0.27 µrad.
+        assert_eq!(largest(&[&known]).unwrap().0, "ECY 27.00 ± 0.54 µrad");
+    }
 }

@@ -8,6 +8,7 @@ use maud::Markup;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use minus::with_minus_signs;
 use screen::{Made, Screen, Tone};
 use terminal::{Part, Room};
 
@@ -29,6 +30,7 @@ pub mod lines;
 pub mod loss;
 pub mod machine_defaults;
 pub mod machine_of_bag;
+mod minus;
 mod over_time;
 pub mod page;
 pub mod paths;
@@ -146,7 +148,8 @@ impl Report {
 
     /// All of the report as it stands on a terminal.
     pub fn terminal(&self) -> String {
-        format!("{}{}", self.head(), terminal::whole(&self.parts))
+        let text = format!("{}{}", self.head(), terminal::whole(&self.parts));
+        with_minus_signs(&text).into_owned()
     }
 
     /// The report in a few lines: the answer, and the tables that matter.

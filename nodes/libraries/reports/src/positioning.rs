@@ -17,6 +17,8 @@ mod single;
 mod tests;
 mod uncertainty;
 
+pub use diagonals::shown_title;
+
 use super::section::{Rows, Section, head, um};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, unstate, unstate_named};
@@ -90,8 +92,8 @@ fn periods_mm(test: &LinearTest, machine: Option<&MachineFile>) -> Vec<f64> {
 
 fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Section> {
     let what = match test.kind {
-        TestKind::Diagonal => "Diagonal",
-        _ => "Positioning",
+        TestKind::Diagonal => diagonals::DIAGONAL,
+        _ => "Positioning ",
     };
     let state = if test.compensated {
         "compensated"
@@ -103,10 +105,8 @@ fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Sect
         Reference::Length => "by the length reference",
         Reference::Scale => "by the linear scale",
     };
-    let mut section = Section::new(format!(
-        "{what} {}, run {} on: {state}, {by}",
-        test.name, test.first_run
-    ));
+    let title = |name: &str| format!("{what}{name}, run {} on: {state}, {by}", test.first_run);
+    let mut section = Section::new(title(&test.name));
     let runs = runs(test, periods_mm(test, tests.machine.as_ref()), measured);
     let found = match side_of(test) {
         _ if single_run::is_single(&runs) => single_run::evaluate(&runs, &measured.budget)
@@ -132,6 +132,10 @@ fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Sect
         }
     }
     section.tell_left_out(&test.left_out);
+    // The figures keep the beam's own name, by which a history knows the test.
+    if test.kind == TestKind::Diagonal {
+        section.title = title(&diagonals::shown_name(test));
+    }
     Ok(section)
 }
 

@@ -125,6 +125,8 @@ pub struct Made {
     pub source: String,
     /// Commit of the software that recorded.
     pub recorded_by: Option<String>,
+    /// Whether nothing was measured: the figures are foreseen, the begin is when that was done, and the source is a plan.
+    pub is_foreseen: bool,
 }
 
 impl Made {
@@ -153,6 +155,20 @@ impl Made {
             end_nanos: between.map(|(_, end)| end),
             source: source.to_owned(),
             recorded_by: commit,
+            is_foreseen: false,
+        }
+    }
+
+    /// Of figures that a program foresees of a plan for a machine, at `now_nanos`.
+    #[must_use]
+    pub fn of_plan(software: Software, machine: &str, source: &str, now_nanos: i64) -> Self {
+        Self {
+            software,
+            machine: Some(machine.to_owned()),
+            begin_nanos: Some(now_nanos),
+            source: source.to_owned(),
+            is_foreseen: true,
+            ..Self::default()
         }
     }
 
@@ -189,14 +205,19 @@ impl Made {
 
     fn html(&self) -> Markup {
         let or_missing = |text: Option<String>| text.unwrap_or_else(|| NOT_STATED.to_owned());
+        let (when, what) = if self.is_foreseen {
+            ("Foreseen", "Plan")
+        } else {
+            ("Measured", "Data")
+        };
         html! {
             dl.facts {
                 dt { "Machine" } dd { (or_missing(self.machine.clone())) }
                 @if !self.namespaces.is_empty() {
                     dt { "Namespace" } dd { (self.namespaces.join(", ")) }
                 }
-                dt { "Measured" } dd { (or_missing(self.when())) }
-                dt { "Data" } dd { (self.source) }
+                dt { (when) } dd { (or_missing(self.when())) }
+                dt { (what) } dd { (self.source) }
                 dt { "Software" } dd { (self.software()) }
             }
         }
@@ -338,6 +359,7 @@ mod tests {
             end_nanos: Some(1_767_603_600_000_000_000),
             source: "runs/first/bag".to_owned(),
             recorded_by: Some("0123456789abcdef".to_owned()),
+            is_foreseen: false,
         }
     }
 
@@ -365,6 +387,21 @@ mod tests {
         };
         assert!(undated.as_json()["begin"].is_null());
         assert!(!undated.html().into_string().contains("Namespace"));
+        let plan = Made::of_plan(
+            made().software,
+            "vmc",
+            "plan.yaml",
+            1_767_600_000_000_000_000,
+        );
+        let html = plan.html().into_string();
+        for words in [
+            "<dd>vmc</dd>",
+            "<dt>Foreseen</dt><dd>2026-01-05 08:00:00 UTC</dd>",
+            "<dt>Plan</dt><dd>plan.yaml</dd>",
+        ] {
+            assert!(html.contains(words), "{words}: {html}");
+        }
+        assert!(!html.contains("Measured"), "{html}");
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::fmt::Display;
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Width, presets};
 use maud::{Markup, html};
 
+use super::minus::with_minus_signs;
 use super::page;
 use super::screen::Tile;
 use super::svg::unsigned_zero;
@@ -133,7 +134,7 @@ impl Section {
                 text.push('\n');
             }
         }
-        text
+        with_minus_signs(&text).into_owned()
     }
 
     /// For a page: folded, its pictures first; tables stand behind a picture where there is one.

@@ -15,6 +15,7 @@ use anyhow::Result;
 
 use super::plot::{self, Plot, Trace};
 use super::section::{Drawing, Rows, Section, head, um};
+use super::svg::unsigned_zero;
 use crate::evaluate::stops::{SAME_MM, Stop, Stops};
 
 /// Of the stops of a direction each so-manyth is in the table that is tried.
@@ -87,7 +88,7 @@ fn row(stops: &Stops) -> Vec<String> {
         um(deviations().map(f64::abs).fold(0.0, f64::max)),
         um(side(true)),
         um(side(false)),
-        format!("{:.1}", slope(&stops.stops) * 1e6),
+        um_per_m(slope(&stops.stops)),
         if stops.by_scale {
             "linear scale"
         } else {
@@ -110,6 +111,11 @@ fn p95(values: impl Iterator<Item = f64>) -> f64 {
         .get(place.saturating_sub(1))
         .copied()
         .unwrap_or(f64::NAN)
+}
+
+/// A slope in µm/m, a zero without a sign.
+fn um_per_m(slope: f64) -> String {
+    unsigned_zero(format!("{:.1}", slope * 1e6))
 }
 
 /// Of a straight line through all stops, mm/mm.
@@ -163,7 +169,7 @@ pub fn trial(title: &str, runs: &[(&str, &Stops)]) -> Result<Section> {
             um(left.p95_between_mm),
             um(left.rms_mm),
             format!("{:.3}", left.rms_mm / bare_mm),
-            format!("{:.1}", slope(&stops.stops) * 1e6),
+            um_per_m(slope(&stops.stops)),
         ]
     });
     let mut section = Section::new(title);
@@ -302,6 +308,7 @@ mod tests {
         assert!(after < 1e-9, "{after}");
         assert!((wrong - 2.0 * before).abs() < 1e-9 && before > 10.0);
         assert!((slope(&long.stops) - 1e-4).abs() < 1e-12);
+        assert_eq!([um_per_m(-1e-9), um_per_m(-1e-6)], ["0.0", "-1.0"]);
         let section = section(&[long]).unwrap();
         assert!(
             section.terminal().contains("100.0"),

@@ -32,7 +32,7 @@ pub mod webhook;
 use crate::section::{Rows, Section, head};
 use crate::terminal::Rank;
 pub use judged::CONFORMS;
-use judged::{Figure, Judged};
+use judged::{BEFORE_STANDARD, Figure, Judged};
 use limit::Limit;
 use webhook::Webhook;
 
@@ -218,7 +218,8 @@ fn in_short(rows: &[Vec<String>]) -> String {
             let key = (decision.starts_with(CONFORMS), Reverse(decision.as_str()));
             let of_decision = by_decision.entry(key).or_default();
             let test = test.split(": ").next().unwrap_or(test);
-            of_decision.entry(test).or_default().push(in_words(figure));
+            let figure = figure.split(BEFORE_STANDARD).next().unwrap_or(figure);
+            of_decision.entry(test).or_default().push(figure.to_owned());
         }
     }
     let counts = by_decision.iter().map(|((_, decision), tests)| {
@@ -233,12 +234,6 @@ fn in_short(rows: &[Vec<String>]) -> String {
     });
     let counts: Vec<String> = counts.collect();
     format!("{}. Figures judged: {}.", counts.join("; "), rows.len())
-}
-
-/// The name of a figure without that of its standard: `accuracy` of `iso230_2.accuracy`.
-fn in_words(figure: &str) -> String {
-    let own = figure.split_once('.').map_or(figure, |(_, own)| own);
-    own.replace(['_', '.'], " ")
 }
 
 fn title(test: &Value) -> &str {
@@ -431,10 +426,10 @@ mod tests {
         };
         let x = "Positioning X, run 3 on: not compensated, by the length reference";
         let rows = [
-            row("iso230_2.accuracy", x, "cannot be decided"),
-            row("iso230_2.repeatability", x, "does not conform"),
-            row("iso230_2.up.mean_reversal", x, "does not conform"),
-            row("iso230_2.accuracy", "Y", CONFORMS),
+            row("accuracy, ISO 230-2", x, "cannot be decided"),
+            row("repeatability, ISO 230-2", x, "does not conform"),
+            row("up mean reversal, ISO 230-2", x, "does not conform"),
+            row("accuracy, ISO 230-2", "Y", CONFORMS),
         ];
         assert_eq!(
             in_short(&rows),
@@ -454,9 +449,9 @@ mod tests {
         assert_eq!(
             said,
             [
-                ["iso230_2.accuracy", "X", "conforms"],
-                ["iso230_2.accuracy", "Y", "does not conform"],
-                ["iso230_2.up.accuracy", "X", "cannot be decided"],
+                ["accuracy, ISO 230-2", "X", "conforms"],
+                ["accuracy, ISO 230-2", "Y", "does not conform"],
+                ["up accuracy, ISO 230-2", "X", "cannot be decided"],
             ]
         );
         assert_eq!(

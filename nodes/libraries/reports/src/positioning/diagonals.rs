@@ -15,6 +15,11 @@ use crate::plot::{self, Plot, Trace};
 use crate::section::{Drawing, NOT_EVALUATED, Rows, Section, head, um};
 use crate::terminal::Rank;
 
+/// Begin of the title of a test along a diagonal.
+pub(super) const DIAGONAL: &str = "Diagonal ";
+/// What the letters of a space diagonal mean.
+const LETTERS: &str = "PPP, NPP, PNP and PPN: whether X, Y and Z run in the positive (P) or negative (N) direction from the lower end to the upper.";
+
 /// The space diagonal along which a test ran, and whether it ran it upwards.
 fn space_diagonal(test: &LinearTest) -> Option<(SpaceDiagonal, bool)> {
     let along = test.direction;
@@ -32,6 +37,37 @@ fn space_diagonal(test: &LinearTest) -> Option<(SpaceDiagonal, bool)> {
         _ => SpaceDiagonal::Ppp,
     };
     Some((diagonal, upwards))
+}
+
+/// A title of a test whose beam along a space diagonal has the diagonal's letters, in capitals: `Diagonal NPP, run 8 on` of
+/// `Diagonal npp, run 8 on`. Histories know the test by the beam's own letters.
+#[must_use]
+pub fn shown_title(title: &str) -> String {
+    let letters = title.strip_prefix(DIAGONAL).and_then(|rest| rest.get(..3));
+    let named = |letters: &str| {
+        let mut all = SpaceDiagonal::ALL.into_iter().map(SpaceDiagonal::name);
+        all.find(|name| name.eq_ignore_ascii_case(letters))
+    };
+    let is_whole = |rest: &str| !rest.starts_with(char::is_alphanumeric);
+    let behind = title
+        .get(DIAGONAL.len() + 3..)
+        .filter(|rest| is_whole(rest));
+    match (letters.and_then(named), behind) {
+        (Some(name), Some(behind)) => format!("{DIAGONAL}{name}{behind}"),
+        _ => title.to_owned(),
+    }
+}
+
+/// The name of a test, by the letters of its space diagonal where its beam has another name.
+pub(super) fn shown_name(test: &LinearTest) -> String {
+    let Some((diagonal, _)) = space_diagonal(test) else {
+        return test.name.clone();
+    };
+    let letters = diagonal.name();
+    if test.name.is_empty() || letters.eq_ignore_ascii_case(&test.name) {
+        return letters.to_owned();
+    }
+    format!("{letters} (beam {})", test.name)
 }
 
 /// The runs as they are upwards along the diagonal, positions counted from its lower end.
@@ -66,7 +102,7 @@ fn from_lower_end(runs: &mut PositioningRuns) {
 fn one_way(tests: &[LinearTest]) -> Option<Section> {
     let is_one_way = |test: &&LinearTest| space_diagonal(test).is_some() && side_of(test).is_some();
     let one_way = tests.iter().filter(is_one_way);
-    let names: Vec<&str> = one_way.map(|test| test.name.as_str()).collect();
+    let names: Vec<String> = one_way.map(shown_name).collect();
     if names.is_empty() {
         return None;
     }
@@ -180,8 +216,9 @@ fn drawing(result: &DiagonalsResult) -> Result<Drawing> {
     };
     Ok(Drawing {
         svg: plot::svg(&plot)?,
-        caption: "The four diagonals from the mean at their lower end: lines of one slope show a scale error, of several squareness."
-            .to_owned(),
+        caption: format!(
+            "The four diagonals from the mean at their lower end: lines of one slope show a scale error, of several squareness. {LETTERS}"
+        ),
     })
 }
 
@@ -248,6 +285,30 @@ mod tests {
     }
 
     #[test]
+    fn letters_of_a_diagonal_are_capitals_and_another_name_of_its_beam_stays() {
+        for (title, shown) in [
+            (
+                "Diagonal npp, run 8 on: by the laser",
+                "Diagonal NPP, run 8 on: by the laser",
+            ),
+            ("Diagonal PPN: by the laser", "Diagonal PPN: by the laser"),
+            ("Diagonal pppx, run 8 on", "Diagonal pppx, run 8 on"),
+            ("Diagonal d1, run 8 on", "Diagonal d1, run 8 on"),
+            ("Diagonal µµ", "Diagonal µµ"),
+            ("Positioning ppp", "Positioning ppp"),
+        ] {
+            assert_eq!(shown_title(title), shown);
+        }
+        let named = |name: &str| LinearTest {
+            name: name.to_owned(),
+            ..test([-1.0, 1.0, 1.0])
+        };
+        assert_eq!(shown_name(&named("npp")), "NPP");
+        assert_eq!(shown_name(&named("")), "NPP");
+        assert_eq!(shown_name(&named("beam_2")), "NPP (beam beam_2)");
+    }
+
+    #[test]
     fn a_diagonal_that_is_run_from_its_upper_end_is_as_long_and_has_the_same_reversal() {
         let read = test([-1.0, -1.0, 1.0]);
         let as_read = PositioningRuns {
@@ -289,7 +350,10 @@ mod tests {
             linear: four.map(five_runs).to_vec(),
             ..Tests::default()
         };
-        let answer = sections(&tests, None).remove(0).answers.remove(0);
+        let section = sections(&tests, None).remove(0);
+        let caption = &section.drawings[0].caption;
+        assert!(caption.ends_with(LETTERS), "{caption}");
+        let answer = section.answers[0].clone();
         assert!(
             answer.starts_with("As measured, not at 20 °C: systematic"),
             "{answer}"
