@@ -13,8 +13,12 @@ pub mod again;
 pub mod beside;
 #[path = "../../nodes/abbe/src/import/dates.rs"]
 pub mod dates;
+#[path = "../../nodes/abbe/src/import/laser_conditions.rs"]
+pub mod laser_conditions;
 #[path = "../../nodes/abbe/src/import/limits.rs"]
 pub mod limits;
+#[path = "../../nodes/abbe/src/import/listed.rs"]
+pub mod listed;
 #[path = "../../nodes/abbe/src/import/map.rs"]
 pub mod map;
 #[path = "../../nodes/abbe/src/import/map_schema.rs"]
@@ -31,6 +35,8 @@ pub mod parted;
 pub mod passes;
 #[path = "../../nodes/abbe/src/import/recognise.rs"]
 pub mod recognise;
+#[path = "../../nodes/abbe/src/import/renishaw_laser.rs"]
+pub mod renishaw_laser;
 #[path = "../../nodes/abbe/src/import/runs.rs"]
 pub mod runs;
 #[path = "../../nodes/abbe/src/import/same.rs"]

@@ -1,6 +1,6 @@
 //! `abbe import CSV --map MAP -o BAG`: somebody's measurement as a bag that `abbe diagnose` reads.
 //!
-//! A CSV holds what an instrument read; the map says which column is what and how the machine moved. The motion is
+//! A table holds what an instrument read; the map says which column is what and how the machine moved. The motion is
 //! made up from it: rests at the targets of a positioning test, approached as the order of the rows says; an even feed
 //! round a circle, a quarter of a turn ahead of its first row; standing axes for a log. Motors were not recorded and
 //! say nothing: they are written as commanded, which a diagnosis notices and leaves out.
@@ -24,7 +24,10 @@ mod beside;
 mod book;
 mod dates;
 mod file;
+mod instrument;
+mod laser_conditions;
 pub(crate) mod limits;
+mod listed;
 pub(crate) mod map;
 mod map_schema;
 mod measured;
@@ -34,6 +37,7 @@ mod parted;
 mod passes;
 pub(crate) mod propose;
 mod recognise;
+mod renishaw_laser;
 mod runs;
 mod same;
 mod separators;
@@ -56,7 +60,7 @@ use crate::tell::tell;
 /// Arguments of `abbe import`.
 #[derive(Args)]
 pub struct Import {
-    /// Table of readings: text, or a worksheet (xlsx).
+    /// Table of readings: text, a worksheet (xlsx), or a file of an instrument (Renishaw rtl, rta).
     csv: PathBuf,
     /// Which column is what, and how the machine moved.
     #[arg(long, required_unless_present = "propose")]
@@ -85,6 +89,11 @@ impl Import {
         }
     }
 }
+
+/// Attachment of a bag with what its table states.
+pub const ATTACHMENT: &str = "params/import.yaml";
+/// Line of it where the rows were not in the order of the measurement.
+pub const ORDER_UNKNOWN: &str = "order: unknown";
 
 /// A text with the name of its file, which messages quote.
 pub(crate) struct Named {
@@ -188,8 +197,7 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     let mut runs = runs::of(&map.test, &table).with_context(in_table)?;
     let remarks = plausible(&map.test, &machine, &runs).with_context(in_table)?;
     runs.remarks.extend(remarks);
-    let stated = map.resolution();
-    let stated = stated.map(|(key, value)| format!("{key}: {value:?}\n"));
+    let stated = stated(&map, &runs);
     let of_machine = (&machine, machine_text);
     if output.exists() {
         let path = output.to_owned();
@@ -202,7 +210,9 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     folder.finish()?;
     let mut notes = doubts(&map, &runs);
     notes.extend(written.in_words());
+    notes.extend(cells.form.map(|form| format!("a {form}")));
     notes.extend(cells.note);
+    notes.extend(cells.remarks);
     notes.extend(table.left_out);
     let n_odd = table.odd.len();
     let n_rows = runs.runs.iter().map(Vec::len).sum();
@@ -214,6 +224,24 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
         n_odd,
         notes,
     })
+}
+
+/// Whether a file is of an instrument's own form, by its content; one that cannot be read is of none.
+pub(crate) fn is_of_instrument(path: &Path) -> bool {
+    let bytes = path
+        .is_file()
+        .then(|| text_file::bytes(path).ok())
+        .flatten();
+    bytes.is_some_and(|bytes| instrument::of(&bytes).is_some())
+}
+
+/// What a bag carries of a table beside its readings, as YAML; nothing where there is nothing.
+fn stated(map: &Map, runs: &Runs) -> Option<String> {
+    let resolution = map.resolution();
+    let resolution = resolution.map(|(key, value)| format!("{key}: {value:?}\n"));
+    let order = (!runs.is_order_known).then(|| format!("{ORDER_UNKNOWN}\n"));
+    let lines: Vec<String> = resolution.into_iter().chain(order).collect();
+    (!lines.is_empty()).then(|| lines.concat())
 }
 
 /// Refuses targets beyond the travel; gives remarks about readings that the test cannot have.

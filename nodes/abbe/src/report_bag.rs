@@ -32,7 +32,7 @@ use crate::pdf;
 use crate::tell::tell;
 
 mod first_screen;
-mod from_table;
+pub mod from_table;
 
 /// Arguments of `abbe report`.
 #[derive(Args)]

@@ -24,9 +24,7 @@ use crate::noise::unrepeated;
 use crate::noise::whiteness;
 use crate::noise::{self, Noise, Readings};
 use crate::report::figures::{Figures, Note};
-use crate::report::{
-    DoesNotRepeat, GapReport, Inputs, NoiseFloor, NotExcited, OverSession, SCHEMA,
-};
+use crate::report::{DoesNotRepeat, GapReport, NoiseFloor, NotExcited, OverSession, SCHEMA};
 use crate::report::{localise, places};
 use crate::search::families::Slot;
 use crate::search::isolability;
@@ -290,7 +288,6 @@ impl<'a> Base<'a> {
         let figures = figures(&stack, &slots, [&before, &beside], &found, &shrunk, config);
         let report = GapReport {
             schema: SCHEMA.to_owned(),
-            inputs: Inputs::default(),
             noise_floor: noise_floor(self.noise, &inflation, config),
             gap: gap::table(&all, &sizes, before.flagged()),
             r#where: places::places(&stack, &slots, &before.families, &floated),
@@ -299,9 +296,9 @@ impl<'a> Base<'a> {
             shrink: shrunk.shrink,
             not_excited: not_excited(&found, &scattered.seen, kinds),
             next_experiments: next.entries,
-            runtime_s: 0.0,
             over_session,
             does_not_repeat,
+            ..GapReport::default()
         };
         Diagnosis {
             report,

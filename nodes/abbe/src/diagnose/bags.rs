@@ -15,6 +15,8 @@ use reports::loss;
 use sha2::{Digest, Sha256};
 use twin::Session;
 
+use crate::import;
+
 /// What bags hold, as one session.
 pub struct Recorded {
     /// The session.
@@ -183,6 +185,19 @@ pub fn machine_text(path: &Path) -> Result<(String, String)> {
     let text = text::decode(&attachment.data, Comments::Yaml)
         .map_err(|wrong| anyhow!("{name}:{wrong}"))?;
     Ok((name, text))
+}
+
+/// Whether a bag was made of a table whose rows were not in the order of the measurement.
+///
+/// # Errors
+/// When it cannot be opened.
+pub fn is_in_no_order(path: &Path) -> Result<bool> {
+    let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;
+    // A damaged attachment is among the losses of the bag.
+    let attached = bag.attachment(import::ATTACHMENT).ok().flatten();
+    let lines = attached.map(|attached| attached.data).unwrap_or_default();
+    let lines = String::from_utf8_lossy(&lines).into_owned();
+    Ok(lines.lines().any(|line| line == import::ORDER_UNKNOWN))
 }
 
 /// What of a bag cannot be read, in words.

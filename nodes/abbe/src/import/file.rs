@@ -1,4 +1,4 @@
-//! The cells of a file: of a text with separators, or of a worksheet (xlsx).
+//! The cells of a file: of a text with separators, of a worksheet (xlsx), or of an instrument's own form.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -9,7 +9,8 @@ use node_runtime::text_file::{self, Comments};
 
 use super::book;
 use super::dates;
-use super::sheet::{MOST_CELLS, MOST_COLUMNS, Sheet};
+use super::instrument;
+use super::sheet::{Cells, MOST_CELLS, MOST_COLUMNS, Sheet};
 
 /// Begin of a ZIP archive, which an xlsx file is.
 const ZIP: &[u8] = b"PK\x03\x04";
@@ -31,24 +32,14 @@ pub struct Form<'m> {
     pub sheet: Option<&'m str>,
 }
 
-/// Whether a file is a worksheet.
+/// Whether the cells of a file are apart by separators, and neither a worksheet nor of an instrument's own form.
 ///
 /// # Errors
 /// When it cannot be read.
-pub fn is_worksheet(path: &Path) -> Result<bool> {
+pub fn is_separated(path: &Path) -> Result<bool> {
     let bytes = text_file::bytes(path)?;
-    Ok(bytes.starts_with(ZIP) || bytes.starts_with(OLD))
-}
-
-/// The cells of a file, and which of its worksheets they are.
-#[derive(Debug)]
-pub struct Cells {
-    /// The cells.
-    pub sheet: Sheet,
-    /// Name of the worksheet, where the file has several that hold anything.
-    pub name: Option<String>,
-    /// Which worksheet was read and which were not; nothing of a file with one.
-    pub note: Option<String>,
+    let is_worksheet = bytes.starts_with(ZIP) || bytes.starts_with(OLD);
+    Ok(!is_worksheet && instrument::of(&bytes).is_none())
 }
 
 /// Reads the cells of a file. Of several worksheets it is the one that `is_table`, of those that are shown.
@@ -67,11 +58,13 @@ pub fn read(path: &Path, form: Form<'_>, is_table: &dyn Fn(&Sheet) -> bool) -> R
     if let Some(name) = form.sheet {
         bail!("sheet = {name}: does nothing, the file is a text: remove it");
     }
+    if let Some(instrument) = instrument::of(&bytes) {
+        return instrument.cells(&bytes, form.decimal);
+    }
     let sheet = Sheet::of_text(&text_file::read(path, Comments::Csv)?, form.separator)?;
     Ok(Cells {
         sheet,
-        name: None,
-        note: None,
+        ..Cells::default()
     })
 }
 
@@ -105,6 +98,7 @@ fn of_xlsx(bytes: Vec<u8>, form: Form<'_>, is_table: &dyn Fn(&Sheet) -> bool) ->
             sheet,
             name: Some(name.to_owned()),
             note: note(name, &others),
+            ..Cells::default()
         });
     }
     chosen(&mut book, form.decimal, is_table)
@@ -172,6 +166,7 @@ fn chosen(
         sheet,
         name: note.is_some().then_some(name),
         note,
+        ..Cells::default()
     })
 }
 

@@ -5,13 +5,10 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use metrology::Axis;
-use node_runtime::text_file::{self, Comments};
 
-use super::file::{self, Form};
 use super::map::{Direction, Map, Plane, Test, units};
-use super::recognise::{self, Known, Recognised, Role};
+use super::recognise::{Known, Recognised, Role};
 use super::separators;
-use super::sheet::Sheet;
 use super::stated::{in_one_line, quoted};
 use super::times;
 use super::units::{Kind, Unit};
@@ -34,12 +31,20 @@ pub struct Proposal {
 /// # Errors
 /// When the file cannot be read, or none of its columns is recognised.
 pub fn of(path: &Path) -> Result<Proposal> {
-    let (found, sheet) = looked_at(path)?;
-    let found = found.with_context(|| separators::no_names(path))?;
+    let looked = looked::at(path)?;
+    let found = looked.found.with_context(|| separators::no_names(path))?;
     let stem = path.file_stem().map(|stem| stem.to_string_lossy());
     let axis = found.axis(&stem.unwrap_or_default());
     let mut text = Text::new(&found, path);
-    if let Some(name) = sheet {
+    text.start_s = looked.start_s.unwrap_or(0.0);
+    if let Some(form) = looked.form {
+        text.recognised = vec![format!(
+            "{}: {form}, {} readings",
+            path.display(),
+            found.n_rows
+        )];
+    }
+    if let Some(name) = looked.sheet {
         let _ = writeln!(text.head, "sheet: {}", quoted(&name));
         text.recognised.push(format!("sheet: \"{name}\""));
     }
@@ -58,25 +63,6 @@ pub fn of(path: &Path) -> Result<Proposal> {
         recognised: text.recognised,
         needed: text.needed,
     })
-}
-
-/// What is in a file, and the name of its worksheet where it has several.
-fn looked_at(path: &Path) -> Result<(Option<Recognised>, Option<String>)> {
-    let form = Form {
-        separator: ',',
-        decimal: '.',
-        sheet: None,
-    };
-    if !file::is_worksheet(path)? {
-        let found = recognise::of_text(&text_file::read(path, Comments::Csv)?)?;
-        return Ok((found, None));
-    }
-    let is_table = |sheet: &Sheet| {
-        let found = recognise::of(sheet, form.decimal);
-        found.is_some_and(|found| kind(&found).is_some())
-    };
-    let cells = file::read(path, form, &is_table)?;
-    Ok((recognise::of(&cells.sheet, form.decimal), cells.name))
 }
 
 /// Kinds of tests.
@@ -580,6 +566,7 @@ pub fn machine_for(map: &Map) -> String {
 }
 
 mod likely;
+mod looked;
 mod radial;
 mod sign;
 #[cfg(test)]

@@ -38,10 +38,11 @@ impl FromTable {
     }
 }
 
-/// Whether a path is a table by its name.
+/// Whether a path is a table by its name, or a file of an instrument by its content.
 pub fn is_table(path: &Path) -> bool {
     let end = path.extension().and_then(|end| end.to_str());
-    end.is_some_and(|end| ENDS.contains(&end.to_lowercase().as_str())) && !path.is_dir()
+    let is_named = end.is_some_and(|end| ENDS.contains(&end.to_lowercase().as_str()));
+    !path.is_dir() && (is_named || import::is_of_instrument(path))
 }
 
 /// Imports a table by a map, or by what is recognised in it; `None` for a bag.
@@ -52,14 +53,33 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
     if !is_table(path) {
         if map.is_some() {
             bail!(
-                "--map does nothing: {} is no table, which ends with one of {}",
+                "--map does nothing: {} is no table, which ends with one of {}, and no file of an instrument",
                 path.display(),
                 ENDS.join(", ")
             );
         }
         return Ok(None);
     }
-    let (named, mut lines) = match map {
+    let (named, lines, read) = described(path, map)?;
+    let machine = Named {
+        place: "the machine that is taken where none is stated".to_owned(),
+        text: propose::machine_for(&read),
+    };
+    imported(path, (&named, lines), machine).map(Some)
+}
+
+/// The same for a machine file.
+///
+/// # Errors
+/// As [`of`], and where the machine could not have been measured so.
+pub fn of_machine(path: &Path, map: Option<&Path>, machine: Named) -> Result<FromTable> {
+    let (named, lines, _) = described(path, map)?;
+    imported(path, (&named, lines), machine)
+}
+
+/// The map that is given, or the one that is proposed, with the lines of what it rests on.
+fn described(path: &Path, map: Option<&Path>) -> Result<(Named, Vec<String>, Map)> {
+    let (named, lines) = match map {
         Some(map) => (Named::read(map, "map")?, vec![]),
         None => proposed(path)?,
     };
@@ -70,21 +90,25 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
             yaml::placed(place, &named.text, &error.to_string())
         )
     })?;
-    let machine = Named {
-        place: "the machine that is taken where none is stated".to_owned(),
-        text: propose::machine_for(&read),
-    };
+    Ok((named, lines, read))
+}
+
+fn imported(
+    path: &Path,
+    (named, mut lines): (&Named, Vec<String>),
+    machine: Named,
+) -> Result<FromTable> {
     let home = Vanishing::temporary().context("a folder for the bag of the table")?;
     let bag = home.path().join("bag");
-    let imported = import::import(path, &named, machine, &bag)?;
+    let imported = import::import(path, named, machine, &bag)?;
     lines.extend(imported.notes);
     lines.sort_by_key(|line| !line.starts_with(WARNING));
-    Ok(Some(FromTable {
+    Ok(FromTable {
         _home: home,
         bag,
         lines,
         n_odd: imported.n_odd,
-    }))
+    })
 }
 
 /// The map that is proposed for a table, with what it rests on.

@@ -8,6 +8,7 @@ use iso230::positioning::{PositioningRemark, PositioningResult, PositioningRuns}
 use iso230::{Direction, ExpandedLength, positioning};
 use machine::MachineFile;
 use metrology::Axis;
+use metrology::number::decimals_of;
 use metrology::sample::TestKind;
 
 mod curves;
@@ -20,6 +21,7 @@ mod uncertainty;
 pub use diagonals::shown_title;
 
 use super::section::{Rows, Section, head, um};
+use super::svg::unsigned_zero;
 use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, unstate, unstate_named};
 use crate::evaluate::correction::{About, BY_OWN_SCALE, Measured};
@@ -28,14 +30,17 @@ use crate::evaluate::linear::{LinearTest, Reference, STOP_SETTLE, level};
 /// A figure and, where a budget was given, its expanded uncertainty.
 pub fn figure(value: &ExpandedLength, stated: bool) -> String {
     if stated {
-        format!(
-            "{} ± {}",
-            um(value.value_mm),
-            um(value.expanded_uncertainty_mm)
-        )
+        with_u(value.value_mm * 1e3, value.expanded_uncertainty_mm * 1e3)
     } else {
         um(value.value_mm)
     }
+}
+
+/// A value and its expanded uncertainty with two decimals, or more where its second digit is behind them.
+pub(crate) fn with_u(value: f64, expanded: f64) -> String {
+    let decimals = decimals_of(expanded).max(2);
+    let value = unsigned_zero(format!("{value:.decimals$}"));
+    format!("{value} ± {expanded:.decimals$}")
 }
 
 /// One part for each test; a test that cannot be evaluated says why.

@@ -4,6 +4,7 @@ use std::fmt::Display;
 
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Width, presets};
 use maud::{Markup, html};
+use metrology::number::decimals_of;
 
 use super::minus::with_minus_signs;
 use super::page;
@@ -196,7 +197,7 @@ pub fn rounded(value: f64, uncertainty: f64) -> (String, String) {
     if !(value.is_finite() && uncertainty.is_finite() && uncertainty > 0.0) {
         return (unsigned_zero(format!("{value:.2}")), "—".to_owned());
     }
-    let decimals = (1.0 - uncertainty.log10().floor()).clamp(0.0, 9.0) as usize;
+    let decimals = decimals_of(uncertainty);
     (
         unsigned_zero(format!("{value:.decimals$}")),
         format!("{uncertainty:.decimals$}"),

@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use gap_diagnosis::Diagnosis;
+use gap_diagnosis::report::{GapReport, MadeWith};
 use replayer::Reading;
 
 use super::simulated::Simulated;
@@ -31,26 +32,28 @@ impl Diagnosed {
         loss::lines(&self.readings)
     }
 
-    /// The report as JSON. What was lost or left out is a key of its own, where there is any, and so are defaults in use.
+    /// The report as JSON, with what is known beside the diagnosis: losses, defaults in use, the simulator, what was not considered.
     ///
     /// # Errors
     /// When a number has no place in JSON.
     pub fn json(&self) -> Result<serde_json::Value> {
-        let mut report = serde_json::to_value(&self.diagnosis.report)?;
-        if self.readings.iter().any(|reading| !reading.is_whole()) {
-            report["loss"] = self.readings.iter().map(loss::as_json).collect();
-        }
-        if !self.defaults.is_empty() {
-            report["machine_defaults"] = self.defaults.as_slice().into();
-        }
-        if let Some(simulated) = &self.simulated {
-            report["simulated"] = serde_json::to_value(simulated)?;
-        }
-        if !(self.without.is_empty() && self.ablated.is_empty()) {
-            report["made_with"] = serde_json::json!({
-                "without": self.without, "ablated": self.ablated,
-            });
-        }
-        Ok(report)
+        let is_whole = self.readings.iter().all(Reading::is_whole);
+        let is_limited = !(self.without.is_empty() && self.ablated.is_empty());
+        let simulated = self.simulated.as_ref().map(serde_json::to_value);
+        let report = GapReport {
+            loss: if is_whole {
+                vec![]
+            } else {
+                self.readings.iter().map(loss::as_json).collect()
+            },
+            machine_defaults: self.defaults.clone(),
+            simulated: simulated.transpose()?,
+            made_with: is_limited.then(|| MadeWith {
+                without: self.without.clone(),
+                ablated: self.ablated.clone(),
+            }),
+            ..self.diagnosis.report.clone()
+        };
+        Ok(serde_json::to_value(report)?)
     }
 }
