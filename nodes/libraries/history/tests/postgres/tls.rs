@@ -6,19 +6,15 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use history::{Added, HistoryError, Options, Store};
+use history::{Added, HistoryError, Store};
 
 use crate::authority::{Authority, Signed};
 use crate::example::entry;
 use crate::server::Server;
+use crate::writing::PATIENT;
 
 /// The password of each user here.
 const PASSWORD: &str = "geheim7";
-/// Waits long: the tests share few processors.
-const PATIENT: Options = Options {
-    busy_ms: 120_000,
-    most_pages: 4_194_304,
-};
 /// Who must have a password and TLS, or a certificate of his own.
 const RIGHTS: &str = "local all all trust\n\
     hostssl all carrier 127.0.0.1/32 scram-sha-256 clientcert=verify-ca\n\
@@ -241,9 +237,9 @@ fn a_client_shows_its_own_certificate() {
     let ours = with(&own, &own.key);
     open(&url(&server, "certified", "db.shop", &ours)).unwrap();
     open(&url(&server, "carrier", "db.shop", &ours)).unwrap();
-    let encrypted = authority.encrypted(&own, "word 5");
+    let encrypted = authority.encrypted(&own, "w&5");
     let locked = with(&own, &encrypted);
-    let unlocked = format!("{locked}&sslpassword=word%205");
+    let unlocked = format!("{locked}&sslpassword=w%265");
     open(&url(&server, "certified", "db.shop", &unlocked)).unwrap();
     let theirs = stranger.sign("certified", 2);
     let of_stranger = with(&theirs, &theirs.key);

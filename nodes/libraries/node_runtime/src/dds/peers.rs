@@ -154,7 +154,7 @@ impl Host {
     }
 
     /// Where a datagram of discovery goes; the known have their two ports side by side (9.6.2.3).
-    fn of_discovery(&self, is_announcement: bool) -> Vec<SocketAddrV4> {
+    fn discovery_addresses(&self, is_announcement: bool) -> Vec<SocketAddrV4> {
         if is_announcement || self.known.is_empty() {
             return self.sought.clone();
         }
@@ -164,7 +164,7 @@ impl Host {
             .collect()
     }
 
-    fn of_samples(&self) -> impl Iterator<Item = SocketAddrV4> + '_ {
+    fn sample_addresses(&self) -> impl Iterator<Item = SocketAddrV4> + '_ {
         let ports = self.known.iter();
         ports.map(|port| SocketAddrV4::new(self.address, *port))
     }
@@ -193,7 +193,7 @@ impl Copier {
                     if self.is_own(datagram, from) {
                         let is_announcement = announcement(datagram).is_some();
                         for host in &self.hosts {
-                            self.send(datagram, host.of_discovery(is_announcement)).await;
+                            self.send(datagram, host.discovery_addresses(is_announcement)).await;
                         }
                     }
                 }
@@ -202,7 +202,7 @@ impl Copier {
                     let datagram = &second[..len];
                     if self.is_own(datagram, from) {
                         for host in &self.hosts {
-                            self.send(datagram, host.of_samples()).await;
+                            self.send(datagram, host.sample_addresses()).await;
                         }
                     }
                 }
@@ -260,14 +260,19 @@ async fn present(own: Prefix, own_address: SocketAddr, hosts: Vec<Host>) {
     for number in 1.. {
         periods.tick().await;
         for host in &hosts {
-            let said = stand_in(&own, &name_of(&own, host.address), number, &host.sought);
-            let _ = socket.send_to(&said, own_address).await;
+            let word = stand_in(
+                &own,
+                &stand_in_prefix(&own, host.address),
+                number,
+                &host.sought,
+            );
+            let _ = socket.send_to(&word, own_address).await;
         }
     }
 }
 
 /// The prefix of a stand-in: of our own make, and like no other one that our participant meets.
-fn name_of(own: &Prefix, host: Ipv4Addr) -> Prefix {
+fn stand_in_prefix(own: &Prefix, host: Ipv4Addr) -> Prefix {
     let mut name = *own;
     name[PREFIX_LEN - 4..].copy_from_slice(&host.octets());
     name
@@ -283,16 +288,22 @@ mod tests {
     fn a_host_is_sought_at_the_ports_of_its_first_participants() {
         let mut host = Host::new(HOST, 5);
         let ports: Vec<u16> = host
-            .of_discovery(false)
+            .discovery_addresses(false)
             .iter()
             .map(SocketAddrV4::port)
             .collect();
         assert_eq!((ports.len(), ports[0], ports[31]), (32, 8_660, 8_722));
         host.known = BTreeSet::from([8_661, 8_665]);
-        let of = |is_announcement| host.of_discovery(is_announcement).len();
+        let of = |is_announcement| host.discovery_addresses(is_announcement).len();
         assert_eq!((of(true), of(false)), (32, 2));
-        assert_eq!(host.of_discovery(false)[1].to_string(), "10.0.0.7:8664");
-        let samples: Vec<u16> = host.of_samples().map(|address| address.port()).collect();
+        assert_eq!(
+            host.discovery_addresses(false)[1].to_string(),
+            "10.0.0.7:8664"
+        );
+        let samples: Vec<u16> = host
+            .sample_addresses()
+            .map(|address| address.port())
+            .collect();
         assert_eq!(samples, [8_661, 8_665]);
     }
 
