@@ -85,9 +85,8 @@ pub struct Overview {
 /// A verdict with its programme.
 type Judged<'v> = (&'v Verdict, DesignedTruth);
 
-/// Names of the lines of all machines of some minutes.
-#[must_use]
-pub fn of_minutes(minutes: f64) -> String {
+/// Name of the line of all machines of some minutes.
+fn of_minutes(minutes: f64) -> String {
     format!("{minutes} min")
 }
 
