@@ -126,20 +126,33 @@ fn rounds(line: &RoundsLine) -> Vec<String> {
 
 /// Ten sentences for a user: what can be trusted, what cannot, from what size, with which programme.
 pub fn ten_lines(table: &Table, ratio: Option<Ratio>) -> Vec<String> {
-    let arm = |arm: Arm| table.programmes.iter().find(|overview| overview.arm == arm);
-    let (known, left_out, rounds) = (
-        arm(Arm::Designed),
-        arm(Arm::DesignedLeftOut),
-        arm(Arm::DesignedTwoRounds),
-    );
+    let of = |arm: Arm| table.programmes.iter().find(|overview| overview.arm == arm);
+    let [known, left_out, rounds] =
+        [Arm::Designed, Arm::DesignedLeftOut, Arm::DesignedTwoRounds].map(of);
+    let mut lines = of_names(known, &table.targets);
+    lines.extend(of_sizes(known));
+    lines.extend(of_what_is_open(left_out, rounds));
+    lines.push(format!(
+        "Intervals hold the size in {}. {}",
+        figure(
+            &table.targets,
+            "s5: 95 % intervals that hold the parameter, D > 20"
+        ),
+        ratio.map_or_else(
+            || {
+                "What a shop's programme of the same minutes names is in the table of `abbe-trials programmes`."
+                    .to_owned()
+            },
+            ratio_words
+        )
+    ));
+    lines
+}
+
+/// What can be trusted of names.
+fn of_names(known: Option<&Overview>, targets: &[Target]) -> [String; 4] {
     let both = |of: fn(&ProgrammeLine) -> Proportion| by_minutes(known, of);
-    let missed = |of: fn(&ProgrammeLine) -> Proportion| by_minutes(left_out, of);
-    let target = |metric: &str| figure(&table.targets, metric);
-    let round = |of: fn(&RoundsLine) -> Proportion| {
-        let line = rounds.and_then(|overview| overview.rounds.first());
-        line.map_or_else(|| NOT_TRIED.to_owned(), |line| percent(of(line)))
-    };
-    vec![
+    [
         format!(
             "One cause that the programme shows (D above 10) is named alone in {}.",
             both(|line| line.single)
@@ -155,37 +168,41 @@ pub fn ten_lines(table: &Table, ratio: Option<Ratio>) -> Vec<String> {
         ),
         format!(
             "A good machine is given a cause in {}, and any alarm in {}.",
-            target("s5: nothing hidden, any cause named"),
-            target("s5: nothing hidden, any alarm, unknown included")
+            figure(targets, "s5: nothing hidden, any cause named"),
+            figure(targets, "s5: nothing hidden, any alarm, unknown included")
         ),
+    ]
+}
+
+/// From what size, and what few minutes leave out.
+fn of_sizes(known: Option<&Overview>) -> [String; 3] {
+    [
         format!(
             "Few minutes leave instruments out: of faults that all of them together show (D above 10), {} are named.",
-            both(|line| line.of_common)
+            by_minutes(known, |line| line.of_common)
         ),
         format!("Sizes that 20 min show well (D 20): {}.", sizes(known, 0)),
         format!("Sizes that 40 min show well (D 20): {}.", sizes(known, 1)),
+    ]
+}
+
+/// Causes that are not known, and second rounds.
+fn of_what_is_open(left_out: Option<&Overview>, rounds: Option<&Overview>) -> [String; 2] {
+    let line = rounds.and_then(|overview| overview.rounds.first());
+    let round = |of: fn(&RoundsLine) -> Proportion| {
+        line.map_or_else(|| NOT_TRIED.to_owned(), |line| percent(of(line)))
+    };
+    [
         format!(
             "A cause that Abbe does not know gets another's name in {}, unflagged in {}.",
-            missed(|line| line.wrong),
-            missed(|line| line.unflagged)
+            by_minutes(left_out, |line| line.wrong),
+            by_minutes(left_out, |line| line.unflagged)
         ),
         format!(
-            "A second round of 15 min is designed for {} of what is open after the first; {} is exact after it, and of what was \
-             exact {} is so no longer.",
+            "After a first round is open, a second of 15 min is designed in {}; then {} is exact. Of what was exact, {} is so no longer.",
             round(|line| line.designed),
             round(|line| line.exact),
             round(|line| line.spoilt)
-        ),
-        format!(
-            "Intervals hold the size in {}. {}",
-            target("s5: 95 % intervals that hold the parameter, D > 20"),
-            ratio.map_or_else(
-                || {
-                    "How much more than a shop's programme a designed one names is the table of `abbe-trials programmes`."
-                        .to_owned()
-                },
-                ratio_words
-            )
         ),
     ]
 }
@@ -195,7 +212,7 @@ fn by_minutes(overview: Option<&Overview>, of: fn(&ProgrammeLine) -> Proportion)
     let shares = PROGRAMME_MIN.map(|minutes| {
         let line = overview.and_then(|overview| overview.line(minutes));
         let share = line.map_or_else(|| NOT_TRIED.to_owned(), |line| percent(of(line)));
-        format!("{share} (programme of {minutes} min)")
+        format!("{share} ({minutes} min)")
     });
     shares.join(" and ")
 }

@@ -259,9 +259,8 @@ fn touched_last(rig: &Rig) -> Rig {
     sorted.has_motors = true;
     let is_touch = |step: &Step| matches!(step, Step::Latency { .. });
     let passes_time = |step: &Step| matches!(step, Step::Produce { .. } | Step::Wait { .. });
-    let stretches =
-        { &mut sorted.plan.steps }.chunk_by_mut(|a, b| !passes_time(a) && !passes_time(b));
-    for stretch in stretches {
+    let is_one = |a: &Step, b: &Step| !passes_time(a) && !passes_time(b);
+    for stretch in sorted.plan.steps.chunk_by_mut(is_one) {
         stretch.sort_by_key(is_touch);
     }
     sorted
