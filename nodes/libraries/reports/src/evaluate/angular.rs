@@ -28,6 +28,8 @@ pub struct RotaryTest {
     pub up_rad: Vec<Vec<f64>>,
     /// The same towards smaller angles, rad. One of the two is empty where all targets were approached from one side.
     pub down_rad: Vec<Vec<f64>>,
+    /// That mean: what the zero of the reference and the zero of the axis differ by, without whole turns, rad.
+    pub mean_rad: f64,
     /// Places with readings that are no targets, and why.
     pub left_out: Vec<String>,
     /// Longest rest of the command; none: nothing rested.
@@ -162,7 +164,7 @@ fn test(group: &[Run]) -> Option<RotaryTest> {
         runs.iter().map(row).collect::<Vec<Vec<f64>>>()
     };
     let (mut up_rad, mut down_rad) = (of(0), of(1));
-    level(&mut up_rad, &mut down_rad);
+    let mean_rad = zero_rad.unwrap_or(0.0) + level(&mut up_rad, &mut down_rad);
     let targets_deg = places.at(&targets).into_iter();
     Some(RotaryTest {
         axis: first.axis,
@@ -170,6 +172,7 @@ fn test(group: &[Run]) -> Option<RotaryTest> {
         targets_rad: targets_deg.map(f64::to_radians).collect(),
         up_rad,
         down_rad,
+        mean_rad: within_half_a_turn_rad(mean_rad),
         left_out,
         longest_rest: read().map(|stop| stop.until - stop.since).max(),
         has_readings: zero_rad.is_some(),

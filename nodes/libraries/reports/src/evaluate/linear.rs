@@ -54,10 +54,12 @@ pub struct LinearTest {
     pub place_mm: Option<Vector3<f64>>,
     /// Targets by ascending position along the line, mm.
     pub targets_mm: Vec<f64>,
-    /// Deviations per run and target towards greater positions, mm.
+    /// Deviations per run and target towards greater positions, their mean over all taken out, mm.
     pub up_mm: Vec<Vec<f64>>,
     /// The same towards smaller positions, mm. One of the two is empty where all targets were approached from one side.
     pub down_mm: Vec<Vec<f64>>,
+    /// That mean: what the zero of the reference and the zero of the axis differ by, mm.
+    pub mean_mm: f64,
     /// Places with readings that are no targets, and why.
     pub left_out: Vec<String>,
     /// Whether anything was added to the commands while it ran.
@@ -265,7 +267,7 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
     };
     let first_stop = stops().next().map(|stop| stop.place_mm);
     let (mut up_mm, mut down_mm) = (of(0), of(1));
-    level(&mut up_mm, &mut down_mm);
+    let mean_mm = level(&mut up_mm, &mut down_mm);
     Some(LinearTest {
         kind: first.kind,
         axis,
@@ -279,6 +281,7 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
         targets_mm: places.at(&targets),
         up_mm,
         down_mm,
+        mean_mm,
         left_out,
         compensated: group.iter().any(|(.., compensated)| *compensated),
         longest_rest: group
@@ -346,17 +349,18 @@ fn visits(run: &[Approach], places: &Places) -> Visits {
     visits
 }
 
-/// A reference counts from where it was zeroed: the mean of all deviations is taken out.
-pub fn level(up: &mut [Vec<f64>], down: &mut [Vec<f64>]) {
+/// A reference counts from where it was zeroed: takes out the mean of all deviations, and returns it.
+pub fn level(up: &mut [Vec<f64>], down: &mut [Vec<f64>]) -> f64 {
     let all = || up.iter().chain(down.iter()).flatten();
     let n = all().count();
     if n == 0 {
-        return;
+        return 0.0;
     }
     let mean = all().sum::<f64>() / n as f64;
     for value in up.iter_mut().chain(down.iter_mut()).flatten() {
         *value -= mean;
     }
+    mean
 }
 
 #[cfg(test)]
