@@ -30,6 +30,12 @@ pub enum Reason {
     OtherAxis,
     /// A reading of another time than the messages beside it.
     OtherTime,
+    /// A reading of another zero of its instrument than that of its run.
+    OtherZero,
+    /// A reading in another plane than that of its run.
+    OtherPlane,
+    /// A value far from those beside it.
+    Outlier,
     /// The bag has the same message already.
     Repeated,
     /// A reading further from its nominal place than any machine is.
@@ -72,6 +78,9 @@ impl Reason {
             Self::OutOfRange => Defect::OutOfRange.words(),
             Self::OtherAxis => "of another axis than its run's",
             Self::OtherTime => "of another time than the messages beside it",
+            Self::OtherZero => "of another zero than its run's",
+            Self::OtherPlane => "of another plane than its run's",
+            Self::Outlier => "far from those beside it",
             Self::Repeated => "repeated",
             Self::Beyond => "too far from its nominal place",
             Self::OtherMachine => "not of the machine of the machine file",

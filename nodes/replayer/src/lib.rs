@@ -23,6 +23,7 @@ pub mod known;
 pub mod leap;
 mod listening;
 pub mod machines;
+mod outliers;
 pub mod pace;
 pub mod pause;
 pub mod playback;

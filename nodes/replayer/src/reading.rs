@@ -64,8 +64,8 @@ pub struct Taken<'a> {
 }
 
 /// Reads `bag` in an order and hands on every message of the topics `wanted` (their names in
-/// [`abbe_msgs::topics`]), in whatever namespace they are; repeated messages (`repeats`) and messages with wrong stamps
-/// (`stamps`) are left out and counted.
+/// [`abbe_msgs::topics`]), in whatever namespace they are; repeated messages (`repeats`), messages with wrong stamps (`stamps`)
+/// and outliers of thermometers (`outliers`) are left out and counted.
 pub fn read(bag: &Bag, order: Order, wanted: &[&str], mut take: impl FnMut(Taken<'_>)) -> Reading {
     let mut reading = Reading {
         losses: bag.description_losses().to_vec(),
@@ -127,7 +127,7 @@ pub fn read(bag: &Bag, order: Order, wanted: &[&str], mut take: impl FnMut(Taken
     reading
 }
 
-/// Why a message that can be read is left out all the same: it is repeated, or of another time.
+/// Why a message that can be read is left out all the same: it is repeated, of another time, or an outlier.
 fn misplaced(
     wrong_stamps: &WrongStamps,
     passed: &mut Repeats,
@@ -137,8 +137,11 @@ fn misplaced(
     if passed.pass(message) {
         return Some((Reason::Repeated, repeats::WHAT.to_owned()));
     }
-    let what = wrong_stamp(wrong_stamps, message, entry)?;
-    Some((Reason::OtherTime, what))
+    if let Some(what) = wrong_stamp(wrong_stamps, message, entry) {
+        return Some((Reason::OtherTime, what));
+    }
+    let what = wrong_stamps.outlier(message, entry.description.type_name)?;
+    Some((Reason::Outlier, what))
 }
 
 /// What is wrong with the stamp of a message that is right otherwise.

@@ -546,6 +546,7 @@ fn a_rotary_axis_without_a_reference_says_why_it_has_no_figures() {
         targets_rad: vec![],
         up_rad: vec![],
         down_rad: vec![],
+        mean_rad: 0.0,
         left_out: vec![],
         longest_rest: Some(metrology::stamp::Span::from_nanos(2_000_000_000)),
         has_readings: false,

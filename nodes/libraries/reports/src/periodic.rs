@@ -273,6 +273,7 @@ mod tests {
                 place_mm: None,
                 targets_mm: targets_mm.clone(),
                 up_mm: vec![run.clone(); 5],
+                mean_mm: 0.0,
                 down_mm: vec![run.clone(); 5],
                 left_out: vec![],
                 compensated: false,

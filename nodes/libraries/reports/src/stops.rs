@@ -16,7 +16,7 @@ use anyhow::Result;
 use super::plot::{self, Plot, Trace};
 use super::section::{Drawing, Rows, Section, head, um};
 use super::svg::unsigned_zero;
-use crate::evaluate::stops::{SAME_MM, Stop, Stops};
+use crate::evaluate::stops::{Stop, Stops};
 
 /// Of the stops of a direction each so-manyth is in the table that is tried.
 pub const TABLE_EVERY: usize = 2;
@@ -240,10 +240,7 @@ impl Left {
 
 /// Deviations at the stops that are in no table, mm.
 fn between(sides: &[Vec<Stop>; 2], in_table_mm: &[f64]) -> impl Iterator<Item = f64> {
-    let is_in = move |stop: &&Stop| {
-        let near = |at_mm: &f64| (at_mm - stop.commanded_mm).abs() < SAME_MM;
-        in_table_mm.iter().any(near)
-    };
+    let is_in = move |stop: &&Stop| in_table_mm.iter().any(|at_mm| stop.is_at(*at_mm));
     let left = sides.iter().flatten().filter(move |stop| !is_in(stop));
     left.map(|stop| stop.deviation_mm)
 }

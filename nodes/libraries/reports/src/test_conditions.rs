@@ -417,6 +417,7 @@ mod tests {
                 targets_rad: vec![0.0, 1.0],
                 up_rad: vec![],
                 down_rad: vec![],
+                mean_rad: 0.0,
                 left_out: vec![],
                 longest_rest: Some(Span::from_nanos(2_000_000_000)),
                 has_readings: true,

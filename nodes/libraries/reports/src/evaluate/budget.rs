@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use abbe_msgs::topics;
 use anyhow::{Context, Result, anyhow};
 use iso230::budget::{DeviceUncertainty, Expansion};
 use iso230::circular::CircularBudget;
@@ -240,7 +241,9 @@ impl Body {
         for name in &self.thermometers {
             let silent =
                 || format!("names the thermometer {name}, which has no reading during this test");
-            all.push(read.get(name).ok_or_else(silent)?);
+            let readings = read.get(name).ok_or_else(silent)?;
+            check_range(name, readings)?;
+            all.push(readings);
         }
         let n = all.len() as f64;
         let mean = |of: fn(&Readings) -> f64| all.iter().map(|one| of(one)).sum::<f64>() / n;
@@ -303,6 +306,20 @@ impl Body {
             expansion_half_width_per_k: self.expansion_half_width_um_per_m_k * 1e-6,
         }
     }
+}
+
+/// Refuses a thermometer that reads what no budget may state.
+fn check_range(name: &str, readings: &Readings) -> Result<(), String> {
+    let [low, high] = [-FARTHEST_K, FARTHEST_K].map(|off_k| REFERENCE_DEGC + off_k);
+    let both = [readings.least_degc, readings.greatest_degc];
+    let wrong = both.into_iter().find(|degc| !(low..=high).contains(degc));
+    wrong.map_or(Ok(()), |degc| {
+        Err(format!(
+            "names the thermometer {name}, and {}{name} read {} °C during this test: must be from {low} to {high} °C; is it in K or °F?",
+            topics::TEMPERATURE.base,
+            number(degc),
+        ))
+    })
 }
 
 /// The largest value of a key; none where its unit has no limit.

@@ -15,11 +15,11 @@ use nalgebra::Vector3;
 
 pub(super) mod targets;
 
-use targets::{left_out, targets};
+use targets::{Places, left_out, targets};
 
 /// Rest after which readings count.
 pub const STOP_SETTLE: Span = Span::from_nanos(300_000_000);
-/// Positions closer than this are one place, mm.
+/// A command that moves by less rests, mm.
 const SAME_MM: f64 = 1e-6;
 
 /// What measured the runs.
@@ -54,10 +54,12 @@ pub struct LinearTest {
     pub place_mm: Option<Vector3<f64>>,
     /// Targets by ascending position along the line, mm.
     pub targets_mm: Vec<f64>,
-    /// Deviations per run and target towards greater positions, mm.
+    /// Deviations per run and target towards greater positions, their mean over all taken out, mm.
     pub up_mm: Vec<Vec<f64>>,
     /// The same towards smaller positions, mm. One of the two is empty where all targets were approached from one side.
     pub down_mm: Vec<Vec<f64>>,
+    /// That mean: what the zero of the reference and the zero of the axis differ by, mm.
+    pub mean_mm: f64,
     /// Places with readings that are no targets, and why.
     pub left_out: Vec<String>,
     /// Whether anything was added to the commands while it ran.
@@ -230,8 +232,8 @@ pub(super) fn axis_of(segment: &TestSegment) -> Option<Axis> {
     segment.features.first()?.parse().ok()
 }
 
-/// Deviations by direction and place: (up, down).
-pub(super) type Visits = BTreeMap<i64, [Vec<f64>; 2]>;
+/// Deviations by number of the place and direction: (up, down).
+pub(super) type Visits = BTreeMap<usize, [Vec<f64>; 2]>;
 
 fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
     let (first, ..) = group.first()?;
@@ -247,23 +249,25 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
     let rests = group.iter().flat_map(|(_, run, _)| &run.rests);
     let direction = direction(axis, stops().map(|stop| &stop.place_mm))
         .or_else(|| direction(axis, rests.map(|(place_mm, _)| place_mm)))?;
-    let runs: Vec<Visits> = group
+    let read: Vec<Vec<Approach>> = group
         .iter()
-        .map(|(_, run, _)| visits(run, axis, &direction, reference))
+        .map(|(_, run, _)| approaches(run, axis, &direction, reference))
         .collect();
-    let (places, sides) = targets(&runs);
+    let places = Places::of(read.iter().flatten().map(|one| one.along_mm));
+    let runs: Vec<Visits> = read.iter().map(|run| visits(run, &places)).collect();
+    let (targets, sides) = targets(&runs);
     let numbers: Vec<u32> = group.iter().map(|(segment, ..)| segment.run).collect();
-    let left_out = left_out(&runs, &numbers, (&places, sides), (SAME_MM, "mm"));
+    let left_out = left_out(&runs, &numbers, (&targets, sides), (&places, "mm"));
     let of = |side: usize| {
         if !sides.contains(&side) {
             return vec![];
         }
-        let row = |run: &Visits| places.iter().map(|place| run[place][side][0]).collect();
+        let row = |run: &Visits| targets.iter().map(|place| run[place][side][0]).collect();
         runs.iter().map(row).collect::<Vec<Vec<f64>>>()
     };
     let first_stop = stops().next().map(|stop| stop.place_mm);
     let (mut up_mm, mut down_mm) = (of(0), of(1));
-    level(&mut up_mm, &mut down_mm);
+    let mean_mm = level(&mut up_mm, &mut down_mm);
     Some(LinearTest {
         kind: first.kind,
         axis,
@@ -274,9 +278,10 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
         reference,
         direction,
         place_mm: first_stop.map(|at| at - direction * at.dot(&direction)),
-        targets_mm: places.iter().map(|place| *place as f64 * SAME_MM).collect(),
+        targets_mm: places.at(&targets),
         up_mm,
         down_mm,
+        mean_mm,
         left_out,
         compensated: group.iter().any(|(.., compensated)| *compensated),
         longest_rest: group
@@ -299,14 +304,25 @@ fn direction<'a>(
     (farthest - first).try_normalize(SAME_MM)
 }
 
-fn visits(run: &Run, axis: Option<Axis>, direction: &Vector3<f64>, reference: Reference) -> Visits {
-    let mut visits = Visits::new();
+/// One stop with a reading.
+struct Approach {
+    along_mm: f64,
+    deviation_mm: f64,
+    upwards: bool,
+}
+
+fn approaches(
+    run: &Run,
+    axis: Option<Axis>,
+    direction: &Vector3<f64>,
+    reference: Reference,
+) -> Vec<Approach> {
     // On a diagonal places count from the first stop; along an axis from the machine's zero.
     let origin = match (axis, run.stops.first()) {
         (None, Some(stop)) => stop.place_mm,
         _ => Vector3::zeros(),
     };
-    for stop in &run.stops {
+    let approach = |stop: &Reading| {
         let along_mm = direction.dot(&(stop.place_mm - origin));
         let way_mm = direction.dot(&(stop.place_mm - stop.from_mm));
         let read_mm = match (reference, axis) {
@@ -314,28 +330,37 @@ fn visits(run: &Run, axis: Option<Axis>, direction: &Vector3<f64>, reference: Re
             (Reference::Scale, Some(axis)) => stop.scale_mm[axis.index()],
             (Reference::Scale, None) => f64::NAN,
         };
-        if way_mm.abs() > SAME_MM && read_mm.is_finite() {
-            let [up, down] = visits
-                .entry((along_mm / SAME_MM).round() as i64)
-                .or_default();
-            let side = if way_mm > 0.0 { up } else { down };
-            side.push(read_mm - along_mm);
-        }
+        (way_mm.abs() > SAME_MM && read_mm.is_finite()).then_some(Approach {
+            along_mm,
+            deviation_mm: read_mm - along_mm,
+            upwards: way_mm > 0.0,
+        })
+    };
+    run.stops.iter().filter_map(approach).collect()
+}
+
+fn visits(run: &[Approach], places: &Places) -> Visits {
+    let mut visits = Visits::new();
+    for approach in run {
+        let [up, down] = visits.entry(places.number(approach.along_mm)).or_default();
+        let side = if approach.upwards { up } else { down };
+        side.push(approach.deviation_mm);
     }
     visits
 }
 
-/// A reference counts from where it was zeroed: the mean of all deviations is taken out.
-pub fn level(up: &mut [Vec<f64>], down: &mut [Vec<f64>]) {
+/// A reference counts from where it was zeroed: takes out the mean of all deviations, and returns it.
+pub fn level(up: &mut [Vec<f64>], down: &mut [Vec<f64>]) -> f64 {
     let all = || up.iter().chain(down.iter()).flatten();
     let n = all().count();
     if n == 0 {
-        return;
+        return 0.0;
     }
     let mean = all().sum::<f64>() / n as f64;
     for value in up.iter_mut().chain(down.iter_mut()).flatten() {
         *value -= mean;
     }
+    mean
 }
 
 #[cfg(test)]
@@ -538,6 +563,32 @@ mod tests {
         let tests = tests_of(&[one_sided, one_sided, &[5.5, 10.0, 30.0]]);
         assert_eq!(tests[0].targets_mm, [10.0, 30.0]);
         assert_eq!(tests[0].left_out, ["20.000 mm: run 3 has no reading up"]);
+    }
+
+    #[test]
+    fn stops_a_few_nanometres_apart_are_one_target() {
+        // Up it ends 1.1 nm before each target and down 1.1 nm beyond, as steps of 1/6 mm do about inches.
+        let there = [10.0, 20.0, 30.0].map(|x_mm| x_mm - 1.1e-6);
+        let back = [30.0, 20.0, 10.0].map(|x_mm| x_mm + 1.1e-6);
+        let mut machine = Machine::new();
+        for repeat in 0..3 {
+            let run = repeat + 1;
+            machine
+                .runs
+                .segment(&segment(run, repeat, true, TestKind::Positioning, &["X"]));
+            for x_mm in [&there[..], &[35.0], &back[..]].concat() {
+                let rest = if x_mm == 35.0 { 2 } else { 60 };
+                machine.go(Vector3::new(x_mm, 0.0, 0.0), rest, |_, _| 0.0);
+            }
+            machine.go(Vector3::new(5.0, 0.0, 0.0), 2, |_, _| 0.0);
+            machine
+                .runs
+                .segment(&segment(run, repeat, false, TestKind::Positioning, &["X"]));
+        }
+        let tests = machine.runs.tests();
+        assert_eq!(tests[0].targets_mm, [10.0, 20.0, 30.0]);
+        assert_eq!(tests[0].left_out, [""; 0]);
+        assert_eq!((tests[0].up_mm.len(), tests[0].down_mm.len()), (3, 3));
     }
 
     #[test]

@@ -81,6 +81,27 @@ fn a_body_is_as_warm_as_it_is_stated_or_as_its_thermometers_read_during_the_test
         (found.half_width_k - 0.61_f64.sqrt()).abs() < 1e-12,
         "{found:?}"
     );
+    // Kelvins of a driver: the bounds of temperature_deviation_k hold for thermometers too.
+    for (degc, is_known) in [
+        (119.9, true),
+        (-79.9, true),
+        (295.15, false),
+        (-80.1, false),
+    ] {
+        let read = Thermometers::from([
+            ("bed".to_owned(), readings(&[22.0, degc])),
+            ("nut_x".to_owned(), readings(&[22.0])),
+        ]);
+        let found = budget.machine.temperature(&read);
+        assert_eq!(found.is_ok(), is_known, "{degc}");
+        if let Err(why) = found {
+            let words = format!("temperature/bed read {degc} °C");
+            assert!(
+                why.contains(&words) && why.contains("from -80 to 120 °C"),
+                "{why}"
+            );
+        }
+    }
     let text = text.replacen("thermometers: [bed, nut_x], ", "", 1);
     let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
     let why = budget.machine.temperature(&read).unwrap_err();
