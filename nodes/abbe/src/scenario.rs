@@ -292,7 +292,11 @@ mod tests {
             ("max_file_s: 1.0e-320", false),
             ("max_file_s: 1.0e+308", false),
         ] {
-            std::fs::write(&path, format!("recording: {{{key}}}\n")).unwrap();
+            std::fs::write(
+                &path,
+                format!("title: t\nreport: tests\nlimit_min: 1.0\nrecording: {{{key}}}\n"),
+            )
+            .unwrap();
             let read = ScenarioFile::read(&path);
             assert_eq!(read.is_ok(), is_right, "{key}: {read:?}");
             let words = read.err().map(|error| format!("{error:#}"));
