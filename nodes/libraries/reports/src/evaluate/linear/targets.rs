@@ -105,7 +105,8 @@ pub(in crate::evaluate) fn left_out(
                 }
             }
         }
-        if let (false, [at]) = (flaws.is_empty(), places.at(&[*place])[..]) {
+        let place_mm = places.at(&[*place]);
+        if let (false, [at]) = (flaws.is_empty(), &place_mm[..]) {
             lines.push(format!("{at:.3} {unit}: {}", shortened(&flaws)));
         }
     }
