@@ -22,6 +22,7 @@ mod again;
 mod angles;
 mod beside;
 mod book;
+mod clock_parts;
 mod dates;
 mod file;
 pub(crate) mod limits;
