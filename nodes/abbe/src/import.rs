@@ -25,6 +25,7 @@ mod book;
 mod clock_parts;
 mod dates;
 mod file;
+mod hidden;
 pub(crate) mod limits;
 pub(crate) mod map;
 mod map_schema;
