@@ -18,9 +18,10 @@ const MOST_PARTS: usize = 2_000;
 const MOST_UNPACKED_BYTES: u64 = 128 << 20;
 /// Longest tag of a part, bytes.
 const LONGEST_TAG_BYTES: usize = 64 << 10;
-/// Last row and last column of a worksheet (ECMA-376).
+/// Last row of a worksheet (ECMA-376).
 const LAST_ROW: u32 = 1_048_576;
-const LAST_COLUMN: u32 = 16_384;
+/// Last column of a worksheet.
+pub const LAST_COLUMN: u32 = 16_384;
 /// Most of each list that the reader keeps whole, by the tag of an entry: an entry of 5 bytes takes ten times as many in memory.
 const MOST_OF_LIST: [(&[u8], u64); 6] = [
     (b"si", 2_000_000),

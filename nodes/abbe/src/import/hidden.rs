@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
-use super::book::{named, values};
+use super::book::{LAST_COLUMN, named, values};
 
 /// Looks at the tags of one part of a workbook.
 #[derive(Debug, Default)]
@@ -24,7 +24,7 @@ impl Hidden {
     pub fn take(&mut self, tag: &[u8]) {
         let (name, rest) = named(tag);
         match name {
-            b"col" if is_hidden(rest) => {
+            b"col" if is_hidden(rest) && self.columns.len() < LAST_COLUMN as usize => {
                 if let (Some(first), Some(last)) = (whole(rest, b"min"), whole(rest, b"max")) {
                     self.columns.push(first..=last);
                 }
@@ -35,7 +35,7 @@ impl Hidden {
             }
             b"c" => {
                 let of_reference = values(rest, b"r").first().copied().and_then(column);
-                self.column = of_reference.unwrap_or(self.column.saturating_add(1));
+                self.column = of_reference.unwrap_or(self.column + 1).min(LAST_COLUMN);
             }
             b"v" | b"is" => {
                 self.filled.insert(self.column);
