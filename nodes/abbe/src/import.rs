@@ -47,6 +47,7 @@ mod stated;
 mod table;
 mod times;
 mod units;
+mod unread;
 mod vocabulary;
 mod writer;
 

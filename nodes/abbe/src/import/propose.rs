@@ -48,12 +48,7 @@ pub fn of(path: &Path) -> Result<Proposal> {
         Some(Of::Positioning) => text.positioning(axis)?,
         Some(Of::Log) => text.log(axis)?,
         Some(Of::Circle) => text.circle()?,
-        None => bail!(
-            "{}{}columns {}: neither targets with deviations, nor a time with a displacement, nor angles with radial deviations: write a map (docs/reference/scenario.md#import-map)",
-            pass_names::unsure(&found),
-            sign::unsure(&found),
-            names(&found).join(", ")
-        ),
+        None => bail!("{}", nothing::in_words(&found)),
     };
     Ok(Proposal {
         map: text.finished(),
@@ -594,6 +589,7 @@ pub fn machine_for(map: &Map) -> String {
 }
 
 mod likely;
+mod nothing;
 mod radial;
 mod sign;
 #[cfg(test)]

@@ -5,6 +5,7 @@ use metrology::Axis;
 
 use super::beside;
 use super::map::{Direction, Plane};
+use super::odd::is_missing;
 use super::pass_names;
 use super::quantities;
 use super::sheet::Sheet;
@@ -12,6 +13,7 @@ use super::stated::{self, Stated};
 use super::table::number_of;
 use super::times;
 use super::units::{Kind, Unit};
+use super::unread;
 use super::vocabulary::{is_correction, is_reversed, words};
 
 /// What a column holds.
@@ -45,6 +47,8 @@ pub struct Known {
     pub numbers: Vec<f64>,
     /// Its first cell.
     pub first: String,
+    /// Its first cell that is no number, with its line.
+    pub odd: Option<(u64, String)>,
 }
 
 impl Known {
@@ -104,14 +108,18 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
         n_words(cells) >= 2
             && n_words(cells) > n_numbers(cells)
             && below.any(|(_, cells)| n_numbers(cells) >= 2)
-    })?;
+    });
+    let at = at.or_else(|| unread::head(lines))?;
     let (head_line, head) = &lines[at];
-    let rows: Vec<&Vec<String>> = lines[at + 1..]
+    let has_numbers = lines[at + 1..]
         .iter()
-        .map(|(_, cells)| cells)
-        .filter(|cells| n_numbers(cells) > 0)
-        .take(LOOKED_AT)
-        .collect();
+        .any(|(_, cells)| n_numbers(cells) > 0);
+    let is_row = |cells: &[String]| match has_numbers {
+        true => n_numbers(cells) > 0,
+        false => cells.iter().any(|cell| unread::has_digit(cell)),
+    };
+    let rows = lines[at + 1..].iter().filter(|(_, cells)| is_row(cells));
+    let rows: Vec<&(u64, Vec<String>)> = rows.take(LOOKED_AT).collect();
     let below = lines.get(at + 1).map_or(&[][..], |(_, cells)| cells);
     let units = below
         .iter()
@@ -120,11 +128,10 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
     let units = if stated::is_row(units) { below } else { &[] };
     let columns = head.iter().enumerate().filter(|(_, name)| !name.is_empty());
     let columns = columns.map(|(k, name)| {
-        let cells: Vec<&str> = rows
+        let cells: Vec<(u64, &str)> = rows
             .iter()
-            .filter_map(|row| row.get(k))
-            .map(String::as_str)
-            .filter(|cell| !cell.is_empty())
+            .filter_map(|(line, row)| Some((*line, row.get(k)?.as_str())))
+            .filter(|(_, cell)| !cell.is_empty())
             .collect();
         let unit = units
             .get(k)
@@ -158,11 +165,20 @@ fn is_instant(cell: &str) -> bool {
 pub fn of_text(text: &str) -> Result<Option<Recognised>> {
     let end = text.match_indices('\n').nth(BEGIN);
     let begin = end.map_or(text, |(end, _)| &text[..end]);
-    let forms = [(';', ','), ('\t', ','), (';', '.'), ('\t', '.'), (',', '.')];
+    let forms = [
+        (';', ','),
+        ('\t', ','),
+        (';', '.'),
+        ('\t', '.'),
+        (',', '.'),
+        (',', ','),
+    ];
     let mut failed = None;
     let mut looked = vec![];
     for (separator, decimal) in forms {
         match Sheet::of_text(begin, separator) {
+            // In quotes cells have commas too, before decimals or between thousands.
+            Ok(sheet) if separator == decimal && !unread::has_decimal_commas(&sheet) => {}
             Ok(sheet) => looked.extend(of(&sheet, decimal)),
             Err(error) => failed = Some(error),
         }
@@ -207,7 +223,9 @@ fn both(name: Stated, below: Stated) -> Stated {
     }
 }
 
-fn known(name: &str, below: Stated, cells: &[&str], decimal: char) -> Known {
+fn known(name: &str, below: Stated, lines: &[(u64, &str)], decimal: char) -> Known {
+    let cells: Vec<&str> = lines.iter().map(|(_, cell)| *cell).collect();
+    let cells = cells.as_slice();
     let (_, unit_word) = parts(name);
     let words = quantity_words(name);
     let stated = both(stated::of(name), below);
@@ -236,6 +254,7 @@ fn known(name: &str, below: Stated, cells: &[&str], decimal: char) -> Known {
         unknown,
         numbers,
         first: first(cells, decimal).to_owned(),
+        odd: odd(lines, decimal),
     }
 }
 
@@ -244,6 +263,14 @@ fn first<'c>(cells: &[&'c str], decimal: char) -> &'c str {
     let is_value = |cell: &&&str| number_of(cell, decimal).is_some() || is_instant(cell);
     let value = cells.iter().find(is_value).or(cells.first());
     value.copied().unwrap_or_default()
+}
+
+/// The first cell that is neither a number nor an instant nor missing, with its line.
+fn odd(lines: &[(u64, &str)], decimal: char) -> Option<(u64, String)> {
+    let is_value =
+        |cell: &str| number_of(cell, decimal).is_some() || is_instant(cell) || is_missing(cell);
+    let odd = lines.iter().find(|(_, cell)| !is_value(cell));
+    odd.map(|(line, cell)| (*line, (*cell).to_owned()))
 }
 
 /// Whether a column without a unit is that of a thermometer: named by a place, with numbers that are degrees Celsius.
