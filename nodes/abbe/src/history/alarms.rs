@@ -15,6 +15,7 @@ use node_runtime::{complain, text_file};
 use reports::Report;
 use reports::evaluate::limits::Limits;
 use reports::evaluate::limits::alarms::{Judged, Observed, State};
+use reports::evaluate::limits::of_axis;
 use reports::screen::{Tile, Tone};
 use reports::section::{Rows, Section, head};
 use reports::terminal::Rank;
@@ -152,7 +153,7 @@ impl Alarms {
     ) -> Result<Self> {
         let mut rows = Vec::new();
         for series in store.series(key)? {
-            if !limits.has(&series.machine, &series.name, &series.axis) {
+            if !limits.has(&series.machine, &series.name, &axis_of(&series)) {
                 continue;
             }
             let kept = store.points(series.id, window)?;
@@ -377,10 +378,19 @@ impl Row {
     }
 }
 
+/// The axis of a series: its own, or the one that its test's title names.
+fn axis_of(series: &Series) -> String {
+    if !series.axis.is_empty() {
+        return series.axis.clone();
+    }
+    of_axis::named_in(&series.test).map_or(String::new(), |axis| axis.to_string())
+}
+
 fn judged(limits: &Limits, series: Series, point: Point, source: &str) -> Result<Option<Row>> {
+    let axis = axis_of(&series);
     let observed = Observed {
         name: &series.name,
-        axis: &series.axis,
+        axis: &axis,
         unit: &series.unit,
         value: point.value,
         standard_uncertainty: point.standard_uncertainty,
@@ -495,6 +505,34 @@ mod tests {
             assert_eq!(tone == Tone::Bad, is_alarm);
             assert_eq!(report.screen.tiles[0].tone == Tone::Bad, is_alarm);
             assert_eq!(report.screen.lacks.len(), usize::from(is_alarm));
+        }
+    }
+
+    #[test]
+    fn a_figure_whose_test_names_its_axis_is_held_against_the_limits_of_the_axis() {
+        let text = "rule: simple\nlimits:\n  iso230_2.accuracy: {upper_um: 20.0}\n  iso230_2.accuracy X: {upper_um: 5.0}\n";
+        for (test, n_alarms) in [
+            ("Positioning X: not compensated", 1),
+            ("Positioning Y", 0),
+            ("Circle XY", 0),
+        ] {
+            let figures = [Figure {
+                test: test.to_owned(),
+                name: "iso230_2.accuracy".to_owned(),
+                axis: String::new(),
+                value: 0.008,
+                unit: "mm".to_owned(),
+                ..play(0.0)
+            }];
+            let measured = Measured {
+                machine: "m",
+                at_s: 86_400.0,
+                source: "bag",
+                figures: &figures,
+            };
+            let limits = Limits::read(text, Path::new("limits.yaml")).unwrap();
+            let alarms = Alarms::of_figures(limits, &measured).unwrap();
+            assert_eq!(alarms.lines().len(), n_alarms, "{test}");
         }
     }
 

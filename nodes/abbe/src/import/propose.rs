@@ -7,7 +7,8 @@ use anyhow::{Context, Result, bail};
 use metrology::Axis;
 
 use super::map::{Direction, Map, Plane, Test, units};
-use super::recognise::{Known, Recognised, Role};
+use super::pass_names;
+use super::recognise::{self, Known, Recognised, Role};
 use super::separators;
 use super::stated::{in_one_line, quoted};
 use super::times;
@@ -52,11 +53,7 @@ pub fn of(path: &Path) -> Result<Proposal> {
         Some(Of::Positioning) => text.positioning(axis)?,
         Some(Of::Log) => text.log(axis)?,
         Some(Of::Circle) => text.circle()?,
-        None => bail!(
-            "{}columns {}: neither targets with deviations, nor a time with a displacement, nor angles with radial deviations: write a map (docs/reference/scenario.md#import-map)",
-            sign::unsure(&found),
-            names(&found).join(", ")
-        ),
+        None => bail!("{}", nothing::in_words(&found)),
     };
     Ok(Proposal {
         map: text.finished(),
@@ -140,10 +137,29 @@ impl<'t> Text<'t> {
 
     /// Names a column under a key.
     fn column(&mut self, key: &str, column: &Known) {
-        self.used.push(column.name.clone());
         let _ = writeln!(self.test, "    {key}: {}", quoted(&column.name));
-        self.recognised
-            .push(format!("{key}: column \"{}\"", column.name));
+        self.note(key, column);
+    }
+
+    /// Notes which column gave what a key holds.
+    fn note(&mut self, key: &str, column: &Known) {
+        self.used.push(column.name.clone());
+        let name = &column.name;
+        self.recognised.push(format!("{key}: column \"{name}\""));
+    }
+
+    /// Names the column that is read under a key, and says which other ones fit as well.
+    fn read(&mut self, key: &str, column: &Known) {
+        self.column(key, column);
+        let others = self.found.as_plain(column);
+        let others: Vec<String> = others.map(|other| format!("\"{}\"", other.name)).collect();
+        if !others.is_empty() {
+            self.needed.push(format!(
+                "column \"{}\": read as {key}, and {} by name could be it as well: name the one that is meant in a map",
+                column.name,
+                others.join(", ")
+            ));
+        }
     }
 
     /// Lists what the table lacks.
@@ -239,7 +255,7 @@ impl<'t> Text<'t> {
             "1.0",
             "how far it turned round beyond an end; figures do not depend on it",
         );
-        self.column(key("target_mm", "target_deg"), target);
+        self.read(key("target_mm", "target_deg"), target);
         self.unit(target, place, likely_target(target, place))?;
         if self.readings(taken)? {
             return Ok(());
@@ -272,11 +288,11 @@ impl<'t> Text<'t> {
         match (found.first(Role::Deviation), found.first(Role::Measured)) {
             (Some(read), _) => {
                 sign::check(found, read)?;
-                self.column(key("deviation_um", "deviation_arcsec"), read);
+                self.read(key("deviation_um", "deviation_arcsec"), read);
                 self.unit(read, deviation, likely_deviation(&[read], deviation))?;
             }
             (None, Some(read)) => {
-                self.column(key("measured_mm", "measured_deg"), read);
+                self.read(key("measured_mm", "measured_deg"), read);
                 let likely = likely_target(read, place);
                 self.unit(read, place, likely)?;
             }
@@ -286,6 +302,7 @@ impl<'t> Text<'t> {
     }
 
     fn passes(&mut self, passes: &[(&Known, Direction)], key: &str, wanted: Unit) -> Result<()> {
+        pass_names::check(self.found)?;
         let _ = writeln!(self.test, "    {key}:");
         let columns: Vec<&Known> = passes.iter().map(|(column, _)| *column).collect();
         let likely = likely_deviation(&columns, wanted);
@@ -294,11 +311,9 @@ impl<'t> Text<'t> {
                 Direction::Up => "up",
                 Direction::Down => "down",
             };
-            self.used.push(column.name.clone());
             let name = quoted(&column.name);
             let _ = writeln!(self.test, "      - {{column: {name}, direction: {word}}}");
-            self.recognised
-                .push(format!("pass {word}: column \"{}\"", column.name));
+            self.note(&format!("pass {word}"), column);
             self.unit(column, wanted, likely)?;
         }
         Ok(())
@@ -339,7 +354,7 @@ impl<'t> Text<'t> {
             Some(first_s) => self.start_s = first_s,
             None => self.time_unit(time)?,
         }
-        self.column("displacement_um", read);
+        self.read("displacement_um", read);
         self.unit(read, Unit::Um, likely_deviation(&[read], Unit::Um))?;
         if let Some(run) = found.first(Role::Run) {
             self.column("run", run);
@@ -354,9 +369,7 @@ impl<'t> Text<'t> {
                 continue;
             }
             let _ = writeln!(self.test, "      {id}: {}", quoted(&column.name));
-            self.used.push(column.name.clone());
-            self.recognised
-                .push(format!("temperature_degc.{id}: column \"{}\"", column.name));
+            self.note(&format!("temperature_degc.{id}"), column);
             self.unit(column, Unit::Degc, None)?;
             sensors.push(id);
         }
@@ -433,9 +446,7 @@ impl<'t> Text<'t> {
         match nominal {
             Some((column, radius_mm)) => {
                 let _ = writeln!(self.test, "    radius_mm: {radius_mm:?}");
-                self.recognised
-                    .push(format!("radius_mm: column \"{}\"", column.name));
-                self.used.push(column.name.clone());
+                self.note("radius_mm", column);
             }
             None => self.stated(
                 "radius_mm",
@@ -446,9 +457,7 @@ impl<'t> Text<'t> {
         match radial::feed(found) {
             Some((column, feed_mm_min)) => {
                 let _ = writeln!(self.test, "    feed_mm_min: {feed_mm_min:?}");
-                self.recognised
-                    .push(format!("feed_mm_min: column \"{}\"", column.name));
-                self.used.push(column.name.clone());
+                self.note("feed_mm_min", column);
             }
             None => self.stated(
                 "feed_mm_min",
@@ -457,9 +466,9 @@ impl<'t> Text<'t> {
             ),
         }
         self.column("run", run);
-        self.column("angle_deg", angle);
+        self.read("angle_deg", angle);
         self.unit(angle, Unit::Deg, None)?;
-        self.column("radial_um", read);
+        self.read("radial_um", read);
         self.unit(read, Unit::Um, likely_deviation(&[read], Unit::Um))?;
         Ok(())
     }
@@ -567,6 +576,7 @@ pub fn machine_for(map: &Map) -> String {
 
 mod likely;
 mod looked;
+mod nothing;
 mod radial;
 mod sign;
 #[cfg(test)]

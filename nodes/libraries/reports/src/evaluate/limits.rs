@@ -27,6 +27,7 @@ use serde_json::Value;
 pub mod alarms;
 mod judged;
 mod limit;
+pub mod of_axis;
 pub mod webhook;
 
 use crate::section::{Rows, Section, head};
@@ -115,6 +116,9 @@ impl Limits {
     #[must_use]
     pub fn of_machine(mut self, machine: Option<&str>) -> Self {
         if let Some(own) = machine.and_then(|machine| self.machines.get(machine)) {
+            // A machine's own limit of a figure holds for every axis.
+            self.limits
+                .retain(|name, _| !own.contains_key(of_axis::parted(name).0));
             self.limits
                 .extend(own.iter().map(|(name, limit)| (name.clone(), *limit)));
         }
@@ -138,17 +142,11 @@ impl Limits {
             ..Rows::default()
         };
         for (name, limit) in self.limits.iter().filter(|(name, _)| is_of_tests(name)) {
-            let found: Vec<(&Value, Figure)> = tests
-                .iter()
-                .filter_map(|test| Some((test, Figure::of(test, name)?)))
-                .collect();
-            if found.is_empty() {
-                let known: BTreeSet<String> = tests.iter().flat_map(names).collect();
-                bail!("limits.{name}: no test has such a figure; there are {known:?}");
-            }
+            let found = self.found(name, tests)?;
+            let (name, place) = (of_axis::parted(name).0, name);
             for (test, figure) in found {
                 let judged = Judged::of(figure, *limit, self.rule)
-                    .with_context(|| format!("limits.{name}"))?;
+                    .with_context(|| format!("limits.{place}"))?;
                 let why = no_verdict(test, name).or_else(|| figure.lacks());
                 let deviations = deviations(test, name);
                 let mut row = judged.row((name, title(test)), *limit, why.is_some());
@@ -183,15 +181,15 @@ impl Limits {
     }
 }
 
-/// Whether a name is that of a figure of a test; a name with an axis is not.
+/// Whether a name is that of a figure of a test.
 fn is_of_tests(name: &str) -> bool {
-    !name.contains(' ') && !OF_HISTORY.iter().any(|begin| name.starts_with(begin))
+    !OF_HISTORY.iter().any(|begin| name.starts_with(begin))
 }
 
 /// Adds the decisions, or the reason why none is made.
 fn conclude(section: &mut Section, table: Rows, verdicts: Vec<Value>) {
     if table.rows.is_empty() {
-        let line = "Nothing is judged: the limits name no figure of a test, only those that a history has.";
+        let line = "Nothing is judged: the limits name no figure of these tests, only those of other axes or of a history.";
         section.warn("Nothing is judged", line.to_owned());
         return;
     }
