@@ -374,6 +374,7 @@ fn beside(
     let remarks = in_no_order.into_iter().chain(recorded.remarks).chain(leaps);
     Ok(Diagnosed {
         diagnosis,
+        omitted: recorded.omitted,
         remarks: remarks.chain(of_simulator).collect(),
         readings: recorded.readings,
         defaults,

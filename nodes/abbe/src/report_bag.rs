@@ -4,7 +4,7 @@ use node_runtime::complain;
 use node_runtime::text_file;
 use reports::evaluate::budget::{Budget, unstate};
 use reports::evaluate::limits::{Limits, state_traceability};
-use reports::evaluate::{BrokenOff, Tests};
+use reports::evaluate::{BrokenOff, NotEvaluated, Tests};
 use reports::loss;
 use reports::machine_defaults;
 use reports::page::fold_details;
@@ -72,14 +72,12 @@ fn complain_of(tests: &Tests) {
     for run in &tests.broken_off {
         complain!("abbe: {run}");
     }
+    for run in &tests.not_evaluated {
+        complain!("abbe: {run}");
+    }
     for run in reports::circular::refused(&tests.circles) {
         complain!("abbe: not evaluated: {run}");
     }
-}
-
-/// Whether nothing was lost or left out, and every circle could be evaluated.
-fn is_whole(tests: &Tests) -> bool {
-    tests.reading.is_whole() && reports::circular::refused(&tests.circles).is_empty()
 }
 
 /// Nothing is known of the machine of a table; a map states where it was measured.
@@ -158,7 +156,7 @@ impl ReportBag {
             &tests,
             table.as_ref().map(|table| table.bag.as_path()),
         );
-        let code = loss::exit_code(is_whole(&tests) && n_odd == 0);
+        let code = loss::exit_code(tests.is_whole() && n_odd == 0);
         alarms::ended(alarms.as_ref(), kept, code)
     }
 
@@ -272,6 +270,14 @@ fn judged_page(
     let mut sections = sections(tests, budget)?;
     let mut lines = loss::in_words(&tests.reading);
     lines.extend(tests.broken_off.iter().map(ToString::to_string));
+    let n = tests.not_evaluated.len();
+    if n > 0 {
+        lines.push(format!(
+            "NOT WHOLE: runs that were measured and are not evaluated: {n}."
+        ));
+    }
+    lines.extend(tests.not_evaluated.iter().map(ToString::to_string));
+    let is_bad = n > 0 || !tests.reading.is_whole();
     if sections.is_empty() {
         lines.push("The bag holds no test that can be evaluated.".to_owned());
     }
@@ -300,7 +306,7 @@ fn judged_page(
                 .chain(sections.iter().map(Part::of)),
         ),
         body: html! {
-            @for line in &lines { p.bad[!tests.reading.is_whole()] { (line) } }
+            @for line in &lines { p.bad[is_bad] { (line) } }
             @if let Some(line) = &defaults_line { p { (line) } }
             @for section in &ordered { (section.html()) }
             @if details.len() > MOST_DETAILS {
@@ -320,6 +326,7 @@ fn judged_page(
             "conditions": conditions.section.figures,
             "machine_defaults": defaults,
             "not_completed": not_completed(&tests.broken_off),
+            "not_evaluated": not_evaluated(&tests.not_evaluated),
             "tests": figures,
             "conformance": conformance,
         }),
@@ -341,6 +348,12 @@ fn judged_by(
 /// The runs that the machine did not complete, for machines.
 fn not_completed(runs: &[BrokenOff]) -> serde_json::Value {
     let row = |it: &BrokenOff| serde_json::json!({ "run": it.run, "test": it.test, "reason": BrokenOff::REASON });
+    runs.iter().map(row).collect()
+}
+
+/// The runs that were measured and have no figure, for machines.
+fn not_evaluated(runs: &[NotEvaluated]) -> serde_json::Value {
+    let row = |it: &NotEvaluated| serde_json::json!({ "run": it.run, "test": it.test, "reason": it.reason });
     runs.iter().map(row).collect()
 }
 

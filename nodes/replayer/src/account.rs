@@ -42,6 +42,8 @@ pub enum Reason {
     Beyond,
     /// Axis states of other axes than the machine file's, or far outside its travel.
     OtherMachine,
+    /// Of a run whose end states otherwise than its begin.
+    Contradiction,
     /// Of a run without an end.
     NoEnd,
     /// Of a run without a begin.
@@ -84,6 +86,7 @@ impl Reason {
             Self::Repeated => "repeated",
             Self::Beyond => "too far from its nominal place",
             Self::OtherMachine => "not of the machine of the machine file",
+            Self::Contradiction => "of a run whose begin and end contradict each other",
             Self::NoEnd => "of a run without an end",
             Self::NoBegin => "of a run without a begin",
             Self::NoPlace => "of a run without places of the axes",

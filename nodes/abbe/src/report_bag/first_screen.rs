@@ -296,6 +296,9 @@ fn verdict(
     if let Some(broken) = tests.broken_off.first() {
         return Some((broken.to_string(), Tone::Bad));
     }
+    if let Some(run) = tests.not_evaluated.first() {
+        return Some((run.to_string(), Tone::Bad));
+    }
     if let Some(judged) = judged {
         let answer = judged.answers.first()?.clone();
         let rows = judged.tables.first().map_or(&[][..], |table| &table.rows);
@@ -351,6 +354,7 @@ fn uncapitalised(sentence: &str) -> String {
 
 fn lacks(tests: &Tests, sections: &[Section], stated: bool) -> Vec<String> {
     let mut lacks: Vec<String> = tests.broken_off.iter().map(as_text).collect();
+    lacks.extend(tests.not_evaluated.iter().map(ToString::to_string));
     lacks.extend(warnings(sections));
     if sections.is_empty() {
         lacks.push("The bag holds no test that can be evaluated.".to_owned());

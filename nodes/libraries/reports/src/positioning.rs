@@ -141,6 +141,7 @@ fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Sect
     if test.kind == TestKind::Diagonal {
         section.title = title(&diagonals::shown_name(test));
     }
+    section.name_far(&test.outlying.far);
     Ok(section)
 }
 

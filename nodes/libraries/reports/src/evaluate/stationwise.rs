@@ -8,7 +8,7 @@ use grid_encoder::{GridEncoderConfig, GridEncoderStage, Input, Output};
 use machine::{Kinematics, MachineFile};
 use metrology::Stage;
 use metrology::sample::{AxisState, GridSample, TestKind, TestSegment};
-use metrology::stamp::{Host, Stamp};
+use metrology::stamp::{Host, NANOS_PER_S, Span, Stamp};
 
 /// A circle by its stations, and the machine that ran it.
 #[derive(Debug)]
@@ -19,6 +19,14 @@ pub struct StationCircle {
     pub recording: Recording,
 }
 
+/// Why stops of a circle give no stations.
+const NO_MACHINE: &str = "the bag has no machine file, which would state the chain and the plate: evaluate the bag as it was recorded, with its attachments";
+const NO_PLATE: &str = "the machine file has no grid_encoder, or a chain that cannot be used";
+const OTHER_AXES: &str = "the axis states lack an axis of the machine file";
+
+/// How long after its end a run is waited for, s.
+const LONGEST_WAIT_S: i64 = 3_600;
+
 /// Looks for the circles while a bag is read.
 #[derive(Debug, Default)]
 pub struct Stationwise {
@@ -26,6 +34,12 @@ pub struct Stationwise {
     kinematics: Option<Kinematics>,
     /// Runs that are under way or not reduced yet.
     awaited: Vec<u32>,
+    /// Runs that give no stations, with the reasons.
+    refused: Vec<(u32, String)>,
+    /// Why no run can be reduced.
+    lacks: Option<&'static str>,
+    /// The latest stamp.
+    newest: Stamp<Host>,
     found: Vec<Recording>,
 }
 
@@ -34,9 +48,16 @@ impl Stationwise {
     #[must_use]
     pub fn new(machine: Option<&MachineFile>) -> Self {
         let stage = |file| GridEncoderStage::new(&GridEncoderConfig::default(), file).ok();
+        let stage = machine.and_then(stage);
+        let lacks = match (machine, &stage) {
+            (_, Some(_)) => None,
+            (Some(_), None) => Some(NO_PLATE),
+            (None, None) => Some(NO_MACHINE),
+        };
         Self {
-            stage: machine.and_then(stage),
+            stage,
             kinematics: machine.and_then(|file| Kinematics::new(file).ok()),
+            lacks,
             ..Self::default()
         }
     }
@@ -50,8 +71,11 @@ impl Stationwise {
     /// Begin or end of a test.
     pub fn segment(&mut self, segment: &TestSegment) {
         let is_wanted = segment.kind == TestKind::Circle && segment.stations > 0;
-        if segment.begin && is_wanted && self.stage.is_some() {
-            self.awaited.push(segment.run);
+        if segment.begin && is_wanted {
+            match self.lacks {
+                None => self.awaited.push(segment.run),
+                Some(why) => self.refused.push((segment.run, why.to_owned())),
+            }
         }
         if self.awaited.contains(&segment.run) {
             self.step(segment.at, Input::Segment(segment.clone()));
@@ -71,13 +95,17 @@ impl Stationwise {
     fn step(&mut self, at: Stamp<Host>, input: Input) {
         let mut out = Vec::new();
         let is_needed = !self.awaited.is_empty();
+        self.newest = self.newest.max(at);
         let Some(stage) = self.stage.as_mut().filter(|_| is_needed) else {
             return;
         };
         if stage.step(at, input, &mut out).is_err() {
             // States of another machine than the file's: there is nothing to compare.
             self.stage = None;
-            self.awaited.clear();
+            self.lacks = Some(OTHER_AXES);
+            let refused = self.awaited.drain(..);
+            self.refused
+                .extend(refused.map(|run| (run, OTHER_AXES.to_owned())));
         }
         for output in out {
             match output {
@@ -85,24 +113,69 @@ impl Stationwise {
                     self.awaited.retain(|run| *run != recording.run);
                     self.found.push(*recording);
                 }
-                Output::Diagnostic(Diagnostic::Refused { run, .. }) => {
+                Output::Diagnostic(Diagnostic::Refused { run, refusal }) => {
                     self.awaited.retain(|awaited| *awaited != run);
+                    self.refused.push((run, refusal.to_string()));
                 }
                 _ => {}
             }
         }
     }
 
-    /// The circles, in the order of their runs.
+    /// The circles, in the order of their runs; and the runs that give none, with the reasons.
     #[must_use]
-    pub fn circles(self) -> Vec<StationCircle> {
+    pub fn circles(mut self) -> (Vec<StationCircle>, Vec<(u32, String)>) {
+        // The recording may end with the last run.
+        let end = self.newest + Span::from_nanos(LONGEST_WAIT_S * NANOS_PER_S);
+        self.step(end, Input::Tick);
         let Some(kinematics) = self.kinematics else {
-            return Vec::new();
+            return (Vec::new(), self.refused);
         };
         let of_recording = |recording| StationCircle {
             kinematics: kinematics.clone(),
             recording,
         };
-        self.found.into_iter().map(of_recording).collect()
+        let found = self.found.into_iter().map(of_recording).collect();
+        (found, self.refused)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn circle(begin: bool) -> TestSegment {
+        TestSegment {
+            begin,
+            stations: 72,
+            radius_mm: 50.0,
+            plane: metrology::sample::TestPlane::Xy,
+            ..TestSegment::of_kind(TestKind::Circle, 3, Stamp::from_nanos(1))
+        }
+    }
+
+    #[test]
+    fn a_circle_that_gives_no_stations_is_named_with_the_reason() {
+        let text = include_str!("../../../../../launch_configs/gap_first/machine.yaml");
+        let machine = MachineFile::parse(text, "m").unwrap();
+        assert!(machine.grid_encoder.is_some());
+        let mut bare = machine.clone();
+        bare.grid_encoder = None;
+        for (machine, words) in [
+            (None, "the bag has no machine file"),
+            (Some(&bare), "the machine file has no grid_encoder"),
+            // The recording ends with the run.
+            (Some(&machine), "no readings"),
+        ] {
+            let mut stations = Stationwise::new(machine);
+            stations.segment(&circle(true));
+            stations.segment(&circle(false));
+            let (found, refused) = stations.circles();
+            assert!(found.is_empty());
+            let [(run, why)] = &refused[..] else {
+                panic!("{words}: {refused:?}");
+            };
+            assert!(*run == 3 && why.contains(words), "{refused:?}");
+        }
     }
 }
