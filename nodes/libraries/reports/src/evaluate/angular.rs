@@ -167,9 +167,8 @@ fn test(group: &[Run]) -> Option<RotaryTest> {
         runs.iter().map(row).collect::<Vec<Vec<f64>>>()
     };
     let (mut up_rad, mut down_rad) = (of(0), of(1));
-    let targets_rad: Vec<f64> = { places.at(&targets).iter() }
-        .map(|deg| deg.to_radians())
-        .collect();
+    let targets_deg = places.at(&targets);
+    let targets_rad: Vec<f64> = targets_deg.iter().map(|deg| deg.to_radians()).collect();
     let sides = [&mut up_rad, &mut down_rad];
     let outlying = Outlying::of(false, &targets_rad, &mut numbers, sides);
     left_out.extend(outlying.left_out());

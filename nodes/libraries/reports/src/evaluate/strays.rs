@@ -41,11 +41,11 @@ impl Strays {
                 return Some((Reason::OtherMachine, other.to_string()));
             }
         }
-        let differs = self.last.as_ref().and_then(|last| differs(last, state));
+        let why = self.last.as_ref().and_then(|last| differs(last, state));
         let is_repeated = { self.stray.as_ref() }.is_some_and(|it| differs(it, state).is_none());
-        if differs.is_some() && !is_repeated {
+        if why.is_some() && !is_repeated {
             self.stray = Some(*state);
-            return differs;
+            return why;
         }
         self.stray = None;
         self.last = Some(*state);
