@@ -402,6 +402,9 @@ impl<'t> Text<'t> {
         }
         let first = time.numbers.first().copied().unwrap_or(0.0);
         let named = time.unit.filter(|unit| unit.kind() == Kind::Time);
+        if named.is_none() {
+            self.needed.extend(epochs::check(time, first)?);
+        }
         let of_epoch = || {
             let (word, _) = metrology::epoch::likely_unit(first)?;
             match word {
@@ -588,6 +591,7 @@ pub fn machine_for(map: &Map) -> String {
     text
 }
 
+mod epochs;
 mod likely;
 mod nothing;
 mod radial;
