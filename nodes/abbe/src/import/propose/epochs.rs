@@ -56,7 +56,7 @@ mod tests {
 
     #[test]
     fn counts_from_other_days_are_named_and_those_from_1970_are_taken() {
-        // PowerShell: (Get-Date 2026-01-05).Ticks and .ToFileTimeUtc(), of 1995, 2026 and 2039 too.
+        // The second: Python, (datetime(2026, 1, 5, 8) - datetime(1, 1, 1)) and - datetime(1601, 1, 1), in 100 ns.
         for first in [
             629_000_000_000_000_000.0 + 4e15,
             639_031_968_000_000_000.0,
@@ -65,7 +65,7 @@ mod tests {
             let refused = checked(first).unwrap_err().to_string();
             assert!(refused.contains("ticks of .NET"), "{refused}");
         }
-        for first in [134_120_448_000_000_000.0, 129_000_000_000_000_000.0] {
+        for first in [134_120_736_000_000_000.0, 129_000_000_000_000_000.0] {
             let refused = checked(first).unwrap_err().to_string();
             assert!(refused.contains("file times of Windows"), "{refused}");
         }
