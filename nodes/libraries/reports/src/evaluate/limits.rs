@@ -155,7 +155,7 @@ impl Limits {
                 }
                 table.rows.push(row);
                 if let Some(key) = judged.lacks_lower(name, *limit).filter(|_| why.is_none()) {
-                    one_sided.insert((name.as_str(), key));
+                    one_sided.insert((name, key));
                 }
                 let mut entry = serde_json::json!({ "figure": name, "test": title(test) });
                 if let Some(why) = why {
