@@ -47,7 +47,7 @@ impl Hidden {
 
     /// How many rows and columns are hidden; nothing where none is.
     pub fn in_words(&self, part: &str) -> Option<String> {
-        let is_hidden = |column: &&u32| self.columns.iter().any(|range| range.contains(column));
+        let is_hidden = |column: &&u32| self.columns.iter().any(|range| range.contains(*column));
         let n_columns = self.filled.iter().filter(is_hidden).count();
         let counts = [(self.n_rows, "rows"), (n_columns, "columns")];
         let counts = counts.iter().filter(|(n, _)| *n > 0);

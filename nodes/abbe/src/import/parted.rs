@@ -108,7 +108,7 @@ const MARKS: &[&str] = &[
 /// Words before them that say nothing.
 const BEFORE_MARKS: &[&str] = &["is", "row", "point", "data", "reading", "to", "be", "not"];
 /// First words of columns of notes, in which a sign alone marks a row.
-const NOTES: &[&str] = &[
+const NAMES_OF_NOTES: &[&str] = &[
     "note",
     "notes",
     "remark",
@@ -184,7 +184,7 @@ pub fn check(map: &Map, head: &[String], lines: &Lines, rows: &[Row]) -> Result<
             .collect();
         if is_mark(name) {
             marked(name, &cells, map.decimal)?;
-        } else if is_first(name, NOTES) {
+        } else if is_first(name, NAMES_OF_NOTES) {
             noted(name, &cells)?;
         } else if !is_log && is_of_a_test(name) {
             parted(name, &cells, (run.is_some(), map.decimal))?;

@@ -388,6 +388,9 @@ impl<'t> Text<'t> {
         }
         let first = time.numbers.first().copied().unwrap_or(0.0);
         let named = time.unit.filter(|unit| unit.kind() == Kind::Time);
+        if named.is_none() {
+            self.needed.extend(epochs::check(time, first)?);
+        }
         let of_epoch = || {
             let (word, _) = metrology::epoch::likely_unit(first)?;
             match word {
@@ -574,6 +577,7 @@ pub fn machine_for(map: &Map) -> String {
     text
 }
 
+mod epochs;
 mod likely;
 mod looked;
 mod nothing;

@@ -2,6 +2,7 @@
 
 use super::pass_names::axis_of;
 use super::recognise::Role;
+use super::units::Unit;
 
 /// What a column of numbers holds by a word of its name: by the word's begin, or as a whole. The first that fits holds.
 const ROLE_WORDS: [(Role, &[&str], &[&str]); 9] = [
@@ -128,7 +129,11 @@ pub fn of(words: &[String], is_length: bool) -> Option<Role> {
 pub fn n_qualifiers(words: &[String], role: Role) -> usize {
     let is_number = |word: &str| word.chars().all(|letter| letter.is_ascii_digit());
     let is_plain = |word: &str| {
-        is_of(role, word) || PLAIN.contains(&word) || is_number(word) || axis_of(word).is_some()
+        is_of(role, word)
+            || PLAIN.contains(&word)
+            || Unit::of_word(word).is_some()
+            || is_number(word)
+            || axis_of(word).is_some()
     };
     words.iter().filter(|word| !is_plain(word.as_str())).count()
 }

@@ -314,12 +314,11 @@ pub fn parts(name: &str) -> (Vec<String>, Option<String>) {
     (words, unit)
 }
 
-/// The words of a name and of a note in its brackets, without units.
+/// The words of a name and of a note in its brackets, without the unit.
 fn quantity_words(name: &str) -> Vec<String> {
     let (mut all, inner) = parts(name);
     let note = inner.filter(|inner| Unit::of_word(inner).is_none());
     all.extend(note.iter().flat_map(|note| words(note)));
-    all.retain(|word| Unit::of_word(word).is_none() || word.len() == 1);
     all
 }
 

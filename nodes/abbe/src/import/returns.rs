@@ -1,5 +1,7 @@
 //! Passes that begin anew at an end without a number of the run: the machine came back without a reading between.
 
+use std::cmp::Ordering;
+
 use super::runs::GRID_MM;
 use super::table::Row;
 
@@ -30,9 +32,11 @@ pub fn apart(rows: &[Row]) -> Option<(Vec<Vec<Row>>, String)> {
         return None;
     }
     let mut passes: Vec<Vec<Row>> = vec![];
-    let (mut before, mut way, mut n_returns) = (None, None, 0);
+    let mut before: Option<usize> = None;
+    let mut way: Option<Ordering> = None;
+    let mut n_returns = 0;
     for (row, place) in rows.iter().zip(places) {
-        let step = before.map(|before: usize| place.cmp(&before));
+        let step = before.map(|before| place.cmp(&before));
         let is_back = before.is_some_and(|before| is_return([before, place], n_targets));
         n_returns += usize::from(is_back);
         let goes_on =
