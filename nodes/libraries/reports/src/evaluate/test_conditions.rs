@@ -150,7 +150,7 @@ impl TestConditions {
     pub fn message(&mut self, taken: &mut Taken<'_>) {
         if taken.is_named(topics::TEMPERATURE.base) {
             self.temperature(taken);
-        } else if self.under_way.is_some() {
+        } else if self.is_in_test() {
             self.has_grid |= taken.is(&topics::GRID_POSITION);
             self.has_length |= taken.is(&topics::LENGTH_POSITION);
         }
@@ -174,11 +174,17 @@ impl TestConditions {
         if self.between.is_some() {
             add(&mut self.thermometers, name, degc);
         }
-        if self.under_way.is_some()
+        if self.is_in_test()
             && let Some(test) = self.tests.last_mut()
         {
             add(&mut test.thermometers, name, degc);
         }
+    }
+
+    /// Whether a test is under way; a program of production is none.
+    fn is_in_test(&self) -> bool {
+        let segment = self.under_way.as_ref();
+        segment.is_some_and(|segment| segment.kind != TestKind::Production)
     }
 
     /// Begin or end of a test.
@@ -283,6 +289,35 @@ mod tests {
             temperature_degc,
             variance_k2: 0.0,
         }
+    }
+
+    #[test]
+    fn what_production_between_two_tests_warms_up_is_of_neither() {
+        let mut conditions = TestConditions::default();
+        let mut during = |run, kind, begin_s: i64, degc: [f64; 2]| {
+            conditions.segment(&segment(begin_s, run, true, kind));
+            for (at_s, degc) in [10, 20].into_iter().zip(degc) {
+                conditions.read(&reading(begin_s + at_s, degc));
+            }
+            conditions.segment(&segment(begin_s + 30, run, false, kind));
+        };
+        during(1, TestKind::Positioning, 0, [20.0, 20.2]);
+        during(2, TestKind::Production, 1_000, [26.0, 30.0]);
+        during(3, TestKind::Positioning, 2_000, [24.0, 23.0]);
+        let mean_and_range = |run| {
+            let bed = conditions.during(&[run])["bed"];
+            (bed.mean_degc(), bed.range_k())
+        };
+        let [first, last] = [mean_and_range(1), mean_and_range(3)];
+        assert!(
+            (first.0 - 20.1).abs() < 1e-12 && (first.1 - 0.2).abs() < 1e-12,
+            "{first:?}"
+        );
+        assert!(
+            (last.0 - 23.5).abs() < 1e-12 && (last.1 - 1.0).abs() < 1e-12,
+            "{last:?}"
+        );
+        assert!(conditions.during(&[2]).is_empty());
     }
 
     #[test]
