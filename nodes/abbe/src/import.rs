@@ -39,6 +39,7 @@ mod same;
 mod separators;
 mod sheet;
 mod stated;
+mod statement;
 mod table;
 mod times;
 mod units;
@@ -129,7 +130,7 @@ impl Import {
         };
         let map = Named::read(map, "map")?;
         let machine = Named::read(machine, "machine file")?;
-        let imported = import(&self.csv, &map, machine, output)?;
+        let imported = import(&self.csv, (&map, &[]), machine, output)?;
         tell!(
             "{}: {} runs, {} messages",
             output.display(),
@@ -160,11 +161,16 @@ impl Import {
     }
 }
 
-/// Writes the bag of a table.
+/// Writes the bag of a table; `assumed`: keys of the map whose values nobody stated.
 ///
 /// # Errors
 /// As [`Import::execute`].
-pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -> Result<Imported> {
+pub(crate) fn import(
+    csv: &Path,
+    (named, assumed): (&Named, &[String]),
+    machine: Named,
+    output: &Path,
+) -> Result<Imported> {
     let in_map = |error: &dyn std::fmt::Display| {
         let said = yaml::placed(&named.place, &named.text, &error.to_string());
         anyhow!("map {said}")
@@ -188,15 +194,18 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     let mut runs = runs::of(&map.test, &table).with_context(in_table)?;
     let remarks = plausible(&map.test, &machine, &runs).with_context(in_table)?;
     runs.remarks.extend(remarks);
-    let stated = map.resolution();
-    let stated = stated.map(|(key, value)| format!("{key}: {value:?}\n"));
     let of_machine = (&machine, machine_text);
     if output.exists() {
         let path = output.to_owned();
         return Err(RecorderError::Exists { path }.into());
     }
     let folder = WholeFolder::begin(output)?;
-    let mut writer = Writer::begin(folder.path(), of_machine, map.start_s, stated)?;
+    let mut writer = Writer::begin(
+        folder.path(),
+        of_machine,
+        map.start_s,
+        Some(map.statement(assumed)),
+    )?;
     let n_runs = motion::write(&map, &runs, &mut writer).with_context(in_table)?;
     let written = writer.finish()?;
     folder.finish()?;

@@ -59,8 +59,8 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
         }
         return Ok(None);
     }
-    let (named, mut lines) = match map {
-        Some(map) => (Named::read(map, "map")?, vec![]),
+    let (named, assumed, mut lines) = match map {
+        Some(map) => (Named::read(map, "map")?, vec![], vec![]),
         None => proposed(path)?,
     };
     let place = &named.place;
@@ -76,7 +76,7 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
     };
     let home = Vanishing::temporary().context("a folder for the bag of the table")?;
     let bag = home.path().join("bag");
-    let imported = import::import(path, &named, machine, &bag)?;
+    let imported = import::import(path, (&named, &assumed), machine, &bag)?;
     lines.extend(imported.notes);
     lines.sort_by_key(|line| !line.starts_with(WARNING));
     Ok(Some(FromTable {
@@ -87,8 +87,8 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
     }))
 }
 
-/// The map that is proposed for a table, with what it rests on.
-fn proposed(path: &Path) -> Result<(Named, Vec<String>)> {
+/// The map that is proposed for a table, its keys whose values are assumed, and what it rests on.
+fn proposed(path: &Path) -> Result<(Named, Vec<String>, Vec<String>)> {
     let proposal = propose::of(path).with_context(|| format!("table {}", path.display()))?;
     let mut lines: Vec<String> = proposal.recognised;
     // What was assumed of a column is not folded with what the table lacks.
@@ -101,5 +101,5 @@ fn proposed(path: &Path) -> Result<(Named, Vec<String>)> {
         place: "proposed for the table (abbe import --propose prints it)".to_owned(),
         text: proposal.map,
     };
-    Ok((named, lines))
+    Ok((named, proposal.assumed, lines))
 }

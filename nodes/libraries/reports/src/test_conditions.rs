@@ -12,6 +12,7 @@ use crate::evaluate::circle_reading::CircleReading;
 use crate::evaluate::circles::{self, CircleRecording};
 use crate::evaluate::correction::{About, Measured};
 use crate::evaluate::course::Course;
+use crate::evaluate::imported::{Imported, OfMap};
 use crate::evaluate::linear::LinearTest;
 use crate::evaluate::test_conditions::{Readings, TestConditions};
 
@@ -226,7 +227,26 @@ fn run_of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
         .filter_map(|test| test.longest_rest)
         .chain(of_rotary.filter_map(|test| test.longest_rest));
     let dwells = listed(dwells.map(|rest| format!("{:.1}", rest.as_secs_f64())));
-    let stated = |text: fn(&Budget) -> &Option<String>| budget.and_then(|one| text(one).clone());
+    let mut conditions = match &seen.imported {
+        Some(table) => vec![
+            date_of_table(table, between),
+            of_table("feed", table.feed()),
+            of_table("dwell", table.dwell()),
+            Condition::new("production before the first test", None, NOT_IN_TABLE),
+        ],
+        None => of_recording(seen, between, feeds, dwells),
+    };
+    conditions.extend(people(budget));
+    conditions
+}
+
+/// A condition of a recording.
+fn of_recording(
+    seen: &TestConditions,
+    between: Option<String>,
+    feeds: Option<String>,
+    dwells: Option<String>,
+) -> Vec<Condition> {
     let before_min = seen.production_before_s / 60.0;
     vec![
         Condition::new("date", between, "the bag holds no test"),
@@ -245,6 +265,45 @@ fn run_of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
             Some(format!("{before_min:.0} min in this bag")),
             "",
         ),
+    ]
+}
+
+/// Where a table and its map say nothing.
+const NOT_IN_TABLE: &str = "not in the table";
+
+/// When the measurement of a table began; a log has times of its own.
+fn date_of_table(table: &Imported, between: Option<String>) -> Condition {
+    let begin = of_table("date", table.begin());
+    if table.is_motion_made_up() || begin.value.is_none() {
+        return begin;
+    }
+    Condition::new("date", between, NOT_IN_TABLE)
+}
+
+/// A value of a map; one that was assumed is no condition of the measurement.
+fn of_table(name: &str, value: OfMap) -> Condition {
+    match value {
+        OfMap::Stated(words) => Condition::new(name, Some(words), ""),
+        OfMap::Assumed(words) => {
+            let place = format!("{NOT_IN_TABLE}; {words} was assumed");
+            Condition::new(name, None, place)
+        }
+        OfMap::Absent => Condition::new(name, None, NOT_IN_TABLE),
+    }
+}
+
+/// Programmed feeds, mm/min; of a table that which a person stated.
+fn feeds_mm_min(seen: &TestConditions) -> Vec<f64> {
+    match &seen.imported {
+        Some(table) => table.stated_feed_mm_min().into_iter().collect(),
+        None => seen.feeds_mm_s.iter().map(|feed| feed * 60.0).collect(),
+    }
+}
+
+/// What a person states beside the recording.
+fn people(budget: Option<&Budget>) -> [Condition; 2] {
+    let stated = |text: fn(&Budget) -> &Option<String>| budget.and_then(|one| text(one).clone());
+    [
         Condition::new(
             "warm-up",
             stated(|budget| &budget.warm_up),

@@ -9,6 +9,7 @@ use recorder::{Bag, Order};
 use replayer::{Taken, reading};
 
 use super::course::Course;
+use super::imported::Imported;
 
 /// Age of the last reading before a test that still counts for it: thermometers are read every few seconds to minutes.
 const LONGEST_AGE: Span = Span::from_nanos(600_000_000_000);
@@ -110,6 +111,8 @@ pub struct TestConditions {
     pub production_before_s: f64,
     /// From the first test to the last one.
     pub thermometers: Thermometers,
+    /// What is stated of a table that was imported; none of a recording.
+    pub imported: Option<Imported>,
     /// Readings of each thermometer over the whole bag, °C.
     pub courses: BTreeMap<String, Course<f64>>,
     tests: Vec<Test>,
@@ -127,7 +130,10 @@ impl TestConditions {
             topics::GRID_POSITION.name,
             topics::LENGTH_POSITION.name,
         ];
-        let mut conditions = Self::default();
+        let mut conditions = Self {
+            imported: Imported::of(bag),
+            ..Self::default()
+        };
         reading::read(bag, Order::LogTime, &wanted, |mut taken| {
             conditions.message(&mut taken);
             if taken.is(&topics::TEST_SEGMENT)
@@ -139,9 +145,15 @@ impl TestConditions {
         conditions
     }
 
-    /// Begin of the first test and end of the last one, ns since 1970.
+    /// Begin of the first test and end of the last one, ns since 1970; of a table without times its stated begin twice.
     #[must_use]
     pub fn nanos(&self) -> Option<(i64, i64)> {
+        if let Some(table) = &self.imported {
+            let begin = table.begin_nanos()?;
+            if table.is_motion_made_up() {
+                return Some((begin, begin));
+            }
+        }
         let (first, last) = self.between?;
         Some((first.nanos(), last.nanos()))
     }
