@@ -223,9 +223,11 @@ fn run_of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
     let of_rotary = tests
         .into_iter()
         .flat_map(|tests| &tests.rotary_positioning);
+    let of_stations = tests.into_iter().flat_map(|tests| &tests.station_circles);
     let dwells = of_lines
         .filter_map(|test| test.longest_rest)
-        .chain(of_rotary.filter_map(|test| test.longest_rest));
+        .chain(of_rotary.filter_map(|test| test.longest_rest))
+        .chain(of_stations.filter_map(|circle| circle.longest_rest));
     let dwells = listed(dwells.map(|rest| format!("{:.1}", rest.as_secs_f64())));
     let mut conditions = match &seen.imported {
         Some(table) => vec![
