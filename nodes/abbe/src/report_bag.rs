@@ -359,7 +359,10 @@ fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> {
     let mut sections = reports::positioning::sections(tests, budget)?;
     sections.extend(reports::periodic::section(tests, budget));
     sections.extend(reports::angular::sections(tests, budget)?);
-    sections.extend(reports::stops::section(&tests.stops));
+    sections.extend(reports::stops::section(
+        &tests.stops,
+        tests.machine.as_ref(),
+    ));
     sections.extend(reports::geometry::tables(&tests.tables));
     sections.extend(reports::circular::sections(
         &tests.circles,

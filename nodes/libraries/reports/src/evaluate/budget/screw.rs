@@ -20,6 +20,13 @@ impl Budget {
         Some(own)
     }
 
+    /// Thermometers of the ball screw of an axis; none where the budget states no screw of it.
+    #[must_use]
+    pub fn thermometers_of_screw(&self, axis: Axis) -> &[String] {
+        let screw = self.screws.get(&axis);
+        screw.map_or(&[], |screw| &screw.thermometers)
+    }
+
     /// Every screw with its name.
     pub(super) fn screws(&self) -> impl Iterator<Item = (String, &Body)> {
         let all = self.screws.iter();
