@@ -266,6 +266,7 @@ fn judged_page(
     budget: Option<&Budget>,
     limits: Option<&Limits>,
 ) -> Result<Report> {
+    budget.map_or(Ok(()), |budget| budget.check_tests(tests))?;
     let conditions = reports::test_conditions::of(&tests.conditions, budget, Some(tests));
     let defaults = machine_defaults::of_tests(tests);
     let defaults_line = machine_defaults::in_words(&defaults);

@@ -103,7 +103,7 @@ impl<'a> About<'a> {
     }
 
     /// The axis whose motor encoder alone led.
-    fn led_by_motor(&self, tests: &Tests) -> Option<Axis> {
+    pub(super) fn led_by_motor(&self, tests: &Tests) -> Option<Axis> {
         let axis = self.axis.filter(|_| !self.is_compensated)?;
         let machine = tests.machine.as_ref();
         let feedback = machine.and_then(|file| file.linear(axis));
