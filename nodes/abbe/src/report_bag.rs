@@ -294,6 +294,7 @@ fn judged_page(
         title: title.to_owned(),
         screen: Screen {
             behind: vec![conditions.section.html()],
+            conditions: conditions.facts.clone(),
             ..screen
         },
         parts: terminal::apart(

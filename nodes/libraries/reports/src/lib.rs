@@ -173,6 +173,7 @@ impl Report {
         let text = format!("\n{}", conditions.terminal());
         self.parts.push(Part::plain(text));
         self.screen.behind.push(conditions.section.html());
+        self.screen.conditions.clone_from(&conditions.facts);
         self.figures["conditions"] = conditions.section.figures.clone();
     }
 

@@ -16,10 +16,15 @@ use crate::evaluate::imported::{Imported, OfMap};
 use crate::evaluate::linear::LinearTest;
 use crate::evaluate::test_conditions::{Readings, TestConditions};
 
+mod artefacts;
+mod facts;
+
 /// The conditions: whole for page and JSON, a few lines for a terminal.
 pub struct Conditions {
     /// The whole.
     pub section: Section,
+    /// Instruments, operator and temperatures, for the first screen: name and text.
+    pub facts: Vec<(String, String)>,
     short: Vec<String>,
 }
 
@@ -83,13 +88,10 @@ pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
     let run = run_of(seen, budget, tests);
     let instruments = instruments_of(seen, budget, tests);
     let correction = correction_of(tests, budget);
-    let rows = run.iter().chain(&instruments).map(Condition::row);
-    let last = vec!["correction to 20 °C".to_owned(), correction.clone()];
-    section.tables.push(Rows {
-        head: head(&["condition", "value"]),
-        rows: rows.chain([last]).collect(),
-        note: String::new(),
-    });
+    let artefacts = artefacts::conditions(tests);
+    section
+        .tables
+        .push(table_of([&run, &instruments, &artefacts], &correction));
     let temperatures: Vec<Vec<String>> = (seen.thermometers.iter())
         .map(|(name, read)| temperature_row(name, read))
         .collect();
@@ -123,18 +125,43 @@ pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
     }
     short.push(format!("Correction to 20 °C: {correction}."));
     short.retain(|line| !line.is_empty());
-    section.figures = json!({
-        "begin": seen.between.map(|(first, _)| date(first)),
-        "end": seen.between.map(|(_, last)| date(last)),
-        "feeds_mm_min": seen.feeds_mm_s.iter().map(|feed| feed * 60.0).collect::<Vec<f64>>(),
-        "production_before_s": seen.production_before_s,
+    section.figures = figures_of(seen, (budget, tests), &correction);
+    Conditions {
+        facts: facts::of(seen, budget, tests),
+        section,
+        short,
+    }
+}
+
+fn table_of(conditions: [&[Condition]; 3], correction: &str) -> Rows {
+    let rows = conditions.into_iter().flatten().map(Condition::row);
+    let last = vec!["correction to 20 °C".to_owned(), correction.to_owned()];
+    Rows {
+        head: head(&["condition", "value"]),
+        rows: rows.chain([last]).collect(),
+        note: String::new(),
+    }
+}
+
+/// The conditions for machines.
+fn figures_of(
+    seen: &TestConditions,
+    (budget, tests): (Option<&Budget>, Option<&Tests>),
+    correction: &str,
+) -> Value {
+    let imported = seen.imported.as_ref();
+    let is_made_up = imported.is_some_and(Imported::is_motion_made_up);
+    json!({
+        "begin": seen.nanos().map(|(first, _)| date(Stamp::from_nanos(first))),
+        "end": seen.nanos().filter(|_| !is_made_up).map(|(_, last)| date(Stamp::from_nanos(last))),
+        "feeds_mm_min": feeds_mm_min(seen),
+        "production_before_s": seen.imported.is_none().then_some(seen.production_before_s),
         "warm_up": budget.and_then(|budget| budget.warm_up.clone()),
         "operator": budget.and_then(|budget| budget.operator.clone()),
         "instruments": instruments_json(seen, budget, tests),
         "thermometers": seen.thermometers.iter().map(temperature_json).collect::<Vec<Value>>(),
         "correction_to_20_degc": correction,
-    });
-    Conditions { section, short }
+    })
 }
 
 /// Fewest readings of a thermometer that make a curve.
@@ -525,6 +552,11 @@ mod tests {
             "2026-01-05 08:00:00 UTC to 2026-01-05 09:00:00 UTC"
         );
         assert_eq!(cell(&silent, "feed"), "6000 mm/min");
+        let fact = |conditions: &Conditions, name: &str| -> String {
+            let mut facts = conditions.facts.iter();
+            facts.find(|(known, _)| known == name).unwrap().1.clone()
+        };
+        assert_eq!(fact(&silent, "Temperature"), NOT_STATED);
         assert_eq!(
             cell(&silent, "length reference, serial number"),
             "not stated (instruments.length_reference.serial_number in budget.yaml)"
@@ -551,6 +583,10 @@ mod tests {
         let whole = of(&seen, Some(&budget), None);
         assert_eq!(cell(&whole, "length reference, serial number"), "12-3");
         assert_eq!(whole.section.figures["operator"], "A. B.");
+        assert_eq!(fact(&whole, "Operator"), "A. B.");
+        let laser = "a laser; serial number 12-3; certificate K 7 of 2026-01-02";
+        assert_eq!(fact(&whole, "Length reference"), laser);
+        assert_eq!(fact(&whole, "Temperature"), "bed 21.50 to 21.50 °C");
         let instrument = &whole.section.figures["instruments"][0];
         assert_eq!(instrument["certificate"], "K 7 of 2026-01-02");
         let terminal = whole.terminal();
