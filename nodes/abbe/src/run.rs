@@ -424,7 +424,7 @@ impl Outcome {
     fn end(self) -> ExitCode {
         let shortcomings = self.shortcomings();
         if !shortcomings.is_empty() {
-            complain!("abbe: what did not go as told:");
+            complain!("abbe: what did not go as planned:");
         }
         for line in &shortcomings {
             complain!("abbe:   {line}");
