@@ -264,6 +264,7 @@ fn judged_page(
     budget: Option<&Budget>,
     limits: Option<&Limits>,
 ) -> Result<Report> {
+    budget.map_or(Ok(()), |budget| budget.check_tests(tests))?;
     let conditions = reports::test_conditions::of(&tests.conditions, budget, Some(tests));
     let defaults = machine_defaults::of_tests(tests);
     let defaults_line = machine_defaults::in_words(&defaults);
@@ -299,6 +300,7 @@ fn judged_page(
         title: title.to_owned(),
         screen: Screen {
             behind: vec![conditions.section.html()],
+            conditions: conditions.facts.clone(),
             ..screen
         },
         parts: terminal::apart(
@@ -372,7 +374,10 @@ fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> {
     let mut sections = reports::positioning::sections(tests, budget)?;
     sections.extend(reports::periodic::section(tests, budget));
     sections.extend(reports::angular::sections(tests, budget)?);
-    sections.extend(reports::stops::section(&tests.stops));
+    sections.extend(reports::stops::section(
+        &tests.stops,
+        tests.machine.as_ref(),
+    ));
     sections.extend(reports::geometry::tables(&tests.tables));
     sections.extend(reports::circular::sections(
         &tests.circles,

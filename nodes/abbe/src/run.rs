@@ -18,6 +18,7 @@ use reports::evaluate::test_conditions::TestConditions;
 use reports::evidence::Evidence;
 use reports::loss;
 use reports::page::fold;
+use reports::probing;
 use reports::screen::Made;
 use reports::section::Section;
 use reports::terminal::{MOST_LINES, Room};
@@ -240,6 +241,8 @@ impl Run {
             let tests = Tests::of(&Bag::open(&bag)?);
             between = tests.conditions.nanos();
             report.join(report_bag::page("", &tests, scenario.budget()?.as_ref())?);
+        } else if scenario.file.report == ReportKind::Rotary && outcome.recorded > 0 {
+            between = add_probing(&mut report, scenario, &Bag::open(&bag)?)?;
         } else if outcome.recorded > 0 {
             let seen = TestConditions::of(&Bag::open(&bag)?);
             between = seen.nanos();
@@ -423,7 +426,7 @@ impl Outcome {
     fn end(self) -> ExitCode {
         let shortcomings = self.shortcomings();
         if !shortcomings.is_empty() {
-            complain!("abbe: what did not go as told:");
+            complain!("abbe: what did not go as planned:");
         }
         for line in &shortcomings {
             complain!("abbe:   {line}");
@@ -441,6 +444,23 @@ impl Outcome {
             }
         }
     }
+}
+
+/// Adds what ISO 230-10 says of the touches, with the conditions; gives begin and end of the tests.
+fn add_probing(report: &mut Report, scenario: &Scenario, bag: &Bag) -> Result<Option<(i64, i64)>> {
+    let tests = Tests::of(bag);
+    let budget = scenario.budget()?;
+    budget
+        .as_ref()
+        .map_or(Ok(()), |budget| budget.check_tests(&tests))?;
+    let sections = probing::sections(&tests, budget.as_ref());
+    report.add_tests(&sections, budget.is_some());
+    report.add_conditions(&test_conditions::of(
+        &tests.conditions,
+        budget.as_ref(),
+        Some(&tests),
+    ));
+    Ok(tests.conditions.nanos())
 }
 
 /// States machine, time, software, the recording and what did not go as planned.

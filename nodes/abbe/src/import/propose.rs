@@ -25,6 +25,8 @@ pub struct Proposal {
     pub recognised: Vec<String>,
     /// What the table lacks, a line each.
     pub needed: Vec<String>,
+    /// Keys whose values are assumed.
+    pub assumed: Vec<String>,
 }
 
 /// Proposes a map for a table.
@@ -59,6 +61,7 @@ pub fn of(path: &Path) -> Result<Proposal> {
         map: text.finished(),
         recognised: text.recognised,
         needed: text.needed,
+        assumed: text.assumed,
     })
 }
 
@@ -99,6 +102,7 @@ struct Text<'t> {
     start_s: f64,
     recognised: Vec<String>,
     needed: Vec<String>,
+    assumed: Vec<String>,
 }
 
 impl<'t> Text<'t> {
@@ -132,6 +136,7 @@ impl<'t> Text<'t> {
             start_s: 0.0,
             recognised: vec![said],
             needed: vec![],
+            assumed: vec![],
         }
     }
 
@@ -166,6 +171,7 @@ impl<'t> Text<'t> {
     fn stated(&mut self, key: &str, value: &str, why: &str) {
         let _ = writeln!(self.test, "    {key}: {value}  # NEEDED: {why}");
         self.needed.push(format!("{key} = {value}: {why}"));
+        self.assumed.push(key.to_owned());
     }
 
     /// States the unit of a column that is read in `wanted`; of one without a unit that cannot be right the `likely` one.
@@ -483,6 +489,7 @@ impl<'t> Text<'t> {
             let _ = writeln!(map, "start_s: {:.0}", self.start_s.floor());
         } else {
             map.push_str("start_s: 0  # NEEDED: when the measurement began, s since 1970\n");
+            self.assumed.push("start_s".to_owned());
             self.needed
                 .push("start_s: when the measurement began, s since 1970".to_owned());
         }

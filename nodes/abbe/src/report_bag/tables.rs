@@ -5,6 +5,7 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::import::Import;
+mod conditions;
 mod odd;
 
 const REFERENCE: &str = include_str!("../../../../tests/validation/iso230_tables.json");
@@ -409,26 +410,6 @@ fn val_a_worksheet_as_reports_print_it_has_the_same_figures() {
             reference("positioning", name),
         );
     }
-}
-
-#[test]
-fn the_resolution_that_a_map_states_is_in_the_bag() {
-    let home = TempDir::new().unwrap();
-    let map = text_file::yaml(&root("tests/import/positioning.yaml")).unwrap();
-    let map = format!("resolution_um: 10.0\n{map}");
-    reported_by(
-        &home,
-        &root("tests/import/positioning.csv"),
-        &map,
-        "gap_first",
-        None,
-    );
-    let bag = Bag::open(home.path().join("bag")).unwrap();
-    let stated = bag.attachment("params/import.yaml").unwrap().unwrap();
-    assert_eq!(
-        String::from_utf8(stated.data).unwrap(),
-        "resolution_um: 10.0\n"
-    );
 }
 
 /// The page of a table alone: no map, no machine file.

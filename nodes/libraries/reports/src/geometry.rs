@@ -41,14 +41,14 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
         model.n_samples,
         um(model.residual_standard_deviation_mm)
     ));
-    section.answer(count(&all, known.len()));
+    section.answer(count(&all, &known));
     section
         .lines
         .extend(signs(model.curves.iter().map(|curve| curve.component)));
     section.tables.push(Rows {
         head: head(&["coefficient", "at the end of the span", "± U (k = 2)", "span"]),
         rows: known.iter().map(|coefficient| coefficient.row()).collect(),
-        note: "A coefficient times the greatest recorded distance from its origin to its power: µm for shifts, µrad for turns. U: expanded uncertainty as the residuals show it, those that follow each other counted as fewer, with what errors of the plate and heat between recordings leave open. How long and how square the plate is as a whole no recording can tell: that is in U where grid_encoder was given the plate's certificate (plate_scale_um_per_m, plate_squareness_urad).".to_owned(),
+        note: "A coefficient times the greatest recorded distance from its origin to its power: µm for shifts, µrad for turns; ~: U exceeds it. U: expanded uncertainty as the residuals show it, those that follow each other counted as fewer, with what errors of the plate and heat between recordings leave open. How long and how square the plate is as a whole no recording can tell: that is in U where grid_encoder was given the plate's certificate (plate_scale_um_per_m, plate_squareness_urad).".to_owned(),
     });
     let (short, long): (Vec<_>, Vec<_>) = model
         .combinations
@@ -67,7 +67,7 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
     }
     section.figures = figures(title, model, &all);
     section.tile = largest(&known).map(|(value, more)| {
-        let more = format!("{more}; {}", count(&all, known.len()).trim_end_matches('.'));
+        let more = format!("{more}; {}", count(&all, &known).trim_end_matches('.'));
         Tile::new("largest known geometric error", value, more)
     });
     match curves::drawings(model) {
@@ -79,11 +79,12 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
     section
 }
 
-/// The largest known shift, or turn where no shift is known, at the end of its span, with U; and what it is.
+/// The largest known shift, or turn where no shift is known, at the end of its span, with U; and what it is. None is smaller
+/// than its U.
 fn largest(known: &[&Coefficient]) -> Option<(String, String)> {
     let of = |is_angular: bool| {
         let own = { known.iter() }.filter(move |c| c.curve.component.is_angular() == is_angular);
-        own.filter(|c| c.at_end().is_finite())
+        own.filter(|c| c.at_end().is_finite() && !c.is_below_u())
             .max_by(|a, b| a.at_end().abs().total_cmp(&b.at_end().abs()))
     };
     let largest = of(false).or_else(|| of(true))?;
@@ -117,14 +118,19 @@ pub fn signs(components: impl Iterator<Item = ErrorComponent>) -> Option<String>
     (!words.is_empty()).then(|| words.join(" "))
 }
 
-fn count(all: &[Coefficient], n_known: usize) -> String {
+fn count(all: &[Coefficient], known: &[&Coefficient]) -> String {
+    let n_known = known.len();
+    let below = match known.iter().filter(|c| c.is_below_u()).count() {
+        0 => String::new(),
+        n => format!(" ({n} with a U above the value, marked ~)"),
+    };
     let unknown: Vec<String> = all
         .iter()
         .filter(|c| !c.is_known())
         .map(Coefficient::name)
         .collect();
     if unknown.is_empty() {
-        return format!("All {n_known} coefficients are known by themselves.");
+        return format!("All {n_known} coefficients are known by themselves{below}.");
     }
     let names = if unknown.len() <= FEW {
         format!(": {}", unknown.join(", "))
@@ -132,7 +138,7 @@ fn count(all: &[Coefficient], n_known: usize) -> String {
         String::new()
     };
     format!(
-        "{n_known} of {} coefficients are known by themselves; {} are not{names}.",
+        "{n_known} of {} coefficients are known by themselves{below}; {} are not{names}.",
         all.len(),
         unknown.len()
     )
@@ -308,6 +314,12 @@ impl Coefficient<'_> {
         vec![self.name(), format!("{u} {}", unit(component)), self.span()]
     }
 
+    /// Whether its value is smaller than its U.
+    fn is_below_u(&self) -> bool {
+        let u = COVERAGE * self.times_reach(&self.curve.standard_uncertainty);
+        u > self.at_end().abs()
+    }
+
     fn span(&self) -> String {
         let (least, greatest) = self.curve.span;
         let axis = self.curve.component.of;
@@ -394,9 +406,10 @@ impl Coefficient<'_> {
     fn row(&self) -> Vec<String> {
         let component = self.curve.component;
         let (value, u) = self.at_end_with_u();
+        let mark = if self.is_below_u() { " ~" } else { "" };
         vec![
             self.name(),
-            format!("{value} {}", unit(component)),
+            format!("{value} {}{mark}", unit(component)),
             u,
             self.span(),
         ]

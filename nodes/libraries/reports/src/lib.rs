@@ -171,11 +171,31 @@ impl Report {
         self.figures[key] = section.figures.clone();
     }
 
+    /// This report with tests of its bag behind it, but for details; without a budget nothing of them has an uncertainty.
+    pub fn add_tests(&mut self, sections: &[section::Section], is_budget_stated: bool) {
+        let shown = sections
+            .iter()
+            .filter(|one| one.rank < terminal::Rank::Detail);
+        let shown: Vec<&section::Section> = shown.collect();
+        for section in &shown {
+            self.parts.push(Part::plain("\n"));
+            self.parts.push(Part::of(section));
+        }
+        self.body = maud::html! { (self.body) @for section in &shown { (section.html()) } };
+        let mut figures: Vec<serde_json::Value> =
+            shown.iter().map(|one| one.figures.clone()).collect();
+        if !is_budget_stated {
+            figures.iter_mut().for_each(evaluate::budget::unstate);
+        }
+        self.figures["tests"] = figures.into();
+    }
+
     /// This report with the conditions of its tests behind it.
     pub fn add_conditions(&mut self, conditions: &test_conditions::Conditions) {
         let text = format!("\n{}", conditions.terminal());
         self.parts.push(Part::plain(text));
         self.screen.behind.push(conditions.section.html());
+        self.screen.conditions.clone_from(&conditions.facts);
         self.figures["conditions"] = conditions.section.figures.clone();
     }
 

@@ -11,6 +11,7 @@ use metrology::Axis;
 use metrology::number::decimals_of;
 use metrology::sample::TestKind;
 
+mod change;
 mod curves;
 mod diagonals;
 mod single;
@@ -51,8 +52,7 @@ pub fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> 
     // What all four diagonals say together comes before each of them.
     let mut sections = diagonals::sections(tests, budget);
     for test in &tests.linear {
-        let measured = Measured::of(tests, budget, About::line(test));
-        sections.push(section(tests, test, &measured)?);
+        sections.push(section(tests, test, budget)?);
     }
     Ok(sections)
 }
@@ -95,7 +95,8 @@ fn periods_mm(test: &LinearTest, machine: Option<&MachineFile>) -> Vec<f64> {
     periods_mm
 }
 
-fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Section> {
+fn section(tests: &Tests, test: &LinearTest, budget: Option<&Budget>) -> Result<Section> {
+    let measured = &Measured::of(tests, budget, About::line(test));
     let what = match test.kind {
         TestKind::Diagonal => diagonals::DIAGONAL,
         _ => "Positioning ",
@@ -128,6 +129,8 @@ fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Sect
         Ok(filled) => {
             filled?;
             state_reference(&mut section, test, measured);
+            let r_mm = section.figures["iso230_2"]["repeatability"]["value_mm"].as_f64();
+            change::state(&mut section, (test, &runs), (tests, budget), r_mm);
         }
         Err(error) => {
             let why = too_short(test).or_else(|| without_places(tests, test));

@@ -245,6 +245,8 @@ fn digits(commit: &str) -> &str {
 pub struct Screen {
     /// Where the figures are from.
     pub made: Option<Made>,
+    /// With which instruments, by whom and at which temperature: name and text.
+    pub conditions: Vec<(String, String)>,
     /// One sentence.
     pub verdict: Option<(String, Tone)>,
     /// What was found, the most important first.
@@ -263,6 +265,7 @@ impl Screen {
     /// This screen with that of another part behind it.
     pub fn join(&mut self, other: Self) {
         self.made = self.made.take().or(other.made);
+        self.conditions.extend(other.conditions);
         self.verdict = self.verdict.take().or(other.verdict);
         self.tiles.extend(other.tiles);
         self.lacks.extend(other.lacks);
@@ -296,6 +299,11 @@ impl Screen {
         html! {
             h1 { (title) }
             @if let Some(made) = &self.made { (made.html()) }
+            @if !self.conditions.is_empty() {
+                dl.facts {
+                    @for (name, text) in &self.conditions { dt { (name) } dd { (text) } }
+                }
+            }
             @if let Some((verdict, tone)) = &self.verdict {
                 p class=(format!("verdict {}", tone.class().unwrap_or_default())) { (verdict) }
             }
@@ -402,6 +410,23 @@ mod tests {
             assert!(html.contains(words), "{words}: {html}");
         }
         assert!(!html.contains("Measured"), "{html}");
+    }
+
+    #[test]
+    fn instrument_operator_and_temperature_stand_before_the_verdict() {
+        let screen = Screen {
+            made: Some(made()),
+            conditions: vec![("Operator".to_owned(), "A. B.".to_owned())],
+            ..compensated(0.04, 0.002, "1 pose")
+        };
+        let html = screen.html("Tests").into_string();
+        let place = |words: &str| {
+            html.find(words)
+                .unwrap_or_else(|| panic!("{words}: {html}"))
+        };
+        assert!(place("<dt>Measured</dt>") < place("<dt>Operator</dt><dd>A. B.</dd>"));
+        assert!(place("A. B.") < place("Compensation takes"));
+        assert!(!html.contains("<details"));
     }
 
     #[test]

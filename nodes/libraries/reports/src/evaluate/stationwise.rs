@@ -2,6 +2,8 @@
 //!
 //! It is what the published separation works on, and the machine file in the bag says of which chain.
 
+use std::collections::BTreeMap;
+
 use grid_encoder::diagnostic::Diagnostic;
 use grid_encoder::recording::Recording;
 use grid_encoder::{GridEncoderConfig, GridEncoderStage, Input, Output};
@@ -9,6 +11,7 @@ use machine::{Kinematics, MachineFile};
 use metrology::Stage;
 use metrology::sample::{AxisState, GridSample, TestKind, TestSegment};
 use metrology::stamp::{Host, NANOS_PER_S, Span, Stamp};
+use nalgebra::Vector3;
 
 /// A circle by its stations, and the machine that ran it.
 #[derive(Debug)]
@@ -17,6 +20,35 @@ pub struct StationCircle {
     pub kinematics: Kinematics,
     /// Its stations.
     pub recording: Recording,
+    /// The longest rest between the first and the last one; none: nothing rested.
+    pub longest_rest: Option<Span>,
+}
+
+/// Commands closer than this are one place, mm.
+const SAME_MM: f64 = 1e-6;
+
+/// Rests of the command in the run that is under way: where, since when and until when.
+#[derive(Debug, Default)]
+struct Rests(Vec<(Vector3<f64>, Stamp<Host>, Stamp<Host>)>);
+
+impl Rests {
+    fn axes(&mut self, state: &AxisState) {
+        let (place_mm, at) = (state.commanded.xyz(), state.received_at);
+        match self.0.last_mut() {
+            Some((known_mm, _, until)) if (*known_mm - place_mm).amax() < SAME_MM => *until = at,
+            // A place of one state was passed.
+            Some(last) if last.1 == last.2 => *last = (place_mm, at, at),
+            _ => self.0.push((place_mm, at, at)),
+        }
+    }
+
+    /// Before the first way and behind the last one the machine may stand for any time.
+    fn longest(&self) -> Option<Span> {
+        let rests = self.0.iter().map(|(_, since, until)| *until - *since);
+        let rests: Vec<Span> = rests.filter(|rest| *rest > Span::default()).collect();
+        let within = rests.len().saturating_sub(1);
+        rests.get(1..within)?.iter().max().copied()
+    }
 }
 
 /// Why stops of a circle give no stations.
@@ -41,6 +73,9 @@ pub struct Stationwise {
     /// The latest stamp.
     newest: Stamp<Host>,
     found: Vec<Recording>,
+    /// Of the run that is under way.
+    rests: Option<Rests>,
+    longest_rests: BTreeMap<u32, Span>,
 }
 
 impl Stationwise {
@@ -73,9 +108,15 @@ impl Stationwise {
         let is_wanted = segment.kind == TestKind::Circle && segment.stations > 0;
         if segment.begin && is_wanted {
             match self.lacks {
-                None => self.awaited.push(segment.run),
+                None => {
+                    self.awaited.push(segment.run);
+                    self.rests = Some(Rests::default());
+                }
                 Some(why) => self.refused.push((segment.run, why.to_owned())),
             }
+        } else if let Some(rests) = self.rests.take() {
+            let longest = rests.longest().map(|rest| (segment.run, rest));
+            self.longest_rests.extend(longest);
         }
         if self.awaited.contains(&segment.run) {
             self.step(segment.at, Input::Segment(segment.clone()));
@@ -84,6 +125,9 @@ impl Stationwise {
 
     /// Positions at one tick.
     pub fn axes(&mut self, state: AxisState) {
+        if let Some(rests) = &mut self.rests {
+            rests.axes(&state);
+        }
         self.step(state.received_at, Input::State(state));
     }
 
@@ -131,8 +175,9 @@ impl Stationwise {
         let Some(kinematics) = self.kinematics else {
             return (Vec::new(), self.refused);
         };
-        let of_recording = |recording| StationCircle {
+        let of_recording = |recording: Recording| StationCircle {
             kinematics: kinematics.clone(),
+            longest_rest: self.longest_rests.get(&recording.run).copied(),
             recording,
         };
         let found = self.found.into_iter().map(of_recording).collect();
@@ -177,5 +222,42 @@ mod tests {
             };
             assert!(*run == 3 && why.contains(words), "{refused:?}");
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use metrology::{AxisSet, PerAxis};
+
+    use super::*;
+
+    #[test]
+    fn the_rest_at_a_station_is_that_of_the_program() {
+        let mut rests = Rests::default();
+        let mut now_ms: i64 = 0;
+        let mut at = |x_mm: f64, rest_ms: i64| {
+            for _ in 0..=rest_ms / 20 {
+                let mut commanded = PerAxis::default();
+                commanded[metrology::Axis::X] = x_mm;
+                let stamp = Stamp::from_nanos(now_ms * 1_000_000);
+                let controller = Stamp::from_nanos(now_ms * 1_000_000);
+                rests.axes(&AxisState::standing(
+                    stamp,
+                    controller,
+                    AxisSet::XYZ,
+                    commanded,
+                ));
+                now_ms += 20;
+            }
+        };
+        // Ten seconds before the circle, a second at each station, and on the way one state at a place.
+        at(-1.0, 10_000);
+        for station in 1..=5 {
+            at(f64::from(station) - 0.5, 0);
+            at(f64::from(station), 1000);
+        }
+        at(6.0, 30_000);
+        assert_eq!(rests.longest(), Some(Span::from_nanos(1_000_000_000)));
+        assert_eq!(Rests::default().longest(), None);
     }
 }

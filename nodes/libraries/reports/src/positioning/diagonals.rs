@@ -3,7 +3,7 @@
 use anyhow::Result;
 use iso230::diagonal;
 use iso230::diagonal::{DiagonalResult, DiagonalRuns, DiagonalsResult, SpaceDiagonal};
-use iso230::positioning::{PointResult, PositioningRuns};
+use iso230::positioning::PositioningRuns;
 use metrology::sample::TestKind;
 
 use super::{LEAST_SHARE, LENGTHS, capital, figure, periods_mm, runs, side_of};
@@ -173,7 +173,7 @@ fn diagonals_section(
                 measured.reservation(),
                 figure(&result.systematic_error, lengths_stated),
                 figure(&result.reversal, measured.is_stated),
-                um(range_of_lengths_mm(&result)),
+                figure(&result.lengths, lengths_stated),
                 figure(&result.spread, lengths_stated),
                 measured.coverage()
             )));
@@ -191,7 +191,7 @@ fn diagonals_section(
             });
             if measured.is_stated && !lengths_stated {
                 unstate_named(&mut section.figures, &LENGTHS);
-                unstate_named(&mut section.figures, &["spread"]);
+                unstate_named(&mut section.figures, &["spread", "lengths"]);
             }
         }
         Err(error) => section.not_evaluated(error),
@@ -222,28 +222,13 @@ fn drawing(result: &DiagonalsResult) -> Result<Drawing> {
     })
 }
 
-/// By how much a diagonal is too long, mm: the mean of both directions at its end less that at its begin.
-fn too_long_mm(one: &DiagonalResult) -> f64 {
-    let points = &one.positioning.points;
-    let mean = |point: Option<&PointResult>| {
-        point.map_or(f64::NAN, |p| f64::midpoint(p.up.mean_mm, p.down.mean_mm))
-    };
-    mean(points.last()) - mean(points.first())
-}
-
-/// The longest diagonal less the shortest one, mm.
-fn range_of_lengths_mm(result: &DiagonalsResult) -> f64 {
-    let all = || result.diagonals.iter().map(too_long_mm);
-    all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min)
-}
-
 fn of_diagonals(result: &DiagonalsResult, measured: &Measured) -> Rows {
     let (stated, lengths_stated) = (measured.is_stated, measured.are_lengths_stated);
     let row = |one: &DiagonalResult| {
         let found = &one.positioning;
         vec![
             one.diagonal.name().to_owned(),
-            um(too_long_mm(one)),
+            um(one.too_long_mm()),
             figure(&found.systematic_error, lengths_stated),
             figure(&found.reversal, stated),
             figure(&found.repeatability, stated),
@@ -368,5 +353,13 @@ mod tests {
         }
         let answer = sections(&longer, None).remove(0).answers.remove(0);
         assert!(answer.contains("differ by 10.00 µm"), "{answer}");
+        let text = include_str!("../../../../../launch_configs/diagonals/budget.yaml");
+        let budget = Budget::read(text, std::path::Path::new("budget.yaml")).unwrap();
+        let section = sections(&longer, Some(&budget)).remove(0);
+        assert!(
+            section.answers[0].contains("differ by 10.00 ± "),
+            "{:?}",
+            section.answers
+        );
     }
 }
