@@ -30,7 +30,7 @@ impl Map {
     }
 
     /// The instrument's resolution with its key, where the map states it.
-    fn resolution(&self) -> Option<(&'static str, f64)> {
+    pub(super) fn resolution(&self) -> Option<(&'static str, f64)> {
         let is_angle = match &self.test {
             Test::Positioning { axis, .. } => !axis.is_linear(),
             _ => false,
