@@ -23,7 +23,7 @@ use abbe_msgs::sensor_msgs::msg::Temperature;
 use abbe_msgs::topics::{self, Entry};
 use abbe_msgs::{Durability, Wire, from_cdr};
 use metrology::epoch::utc_of_nanos;
-use metrology::stamp::{Host, NANOS_PER_S, Span, Stamp};
+use metrology::stamp::{NANOS_PER_S, Span};
 use recorder::{Bag, Event, MessageRef, Order, TopicId};
 
 use crate::known::entry_in_any_namespace;

@@ -8,7 +8,7 @@ use metrology::Axis;
 
 use super::map::{Direction, Map, Plane, Test, units};
 use super::pass_names;
-use super::recognise::{self, Known, Recognised, Role};
+use super::recognise::{Known, Recognised, Role};
 use super::separators;
 use super::stated::{in_one_line, quoted};
 use super::times;

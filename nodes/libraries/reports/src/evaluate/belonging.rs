@@ -11,9 +11,9 @@
 
 use std::fmt;
 
+use metrology::PerAxis;
 use metrology::sample::{AngleSample, AxisState, GridSample, LengthSample, TestSegment};
 use metrology::stamp::{Host, Stamp};
-use metrology::{Axis, PerAxis};
 use replayer::{Account, Place, Reason, Taken};
 
 use super::linear::axis_of;

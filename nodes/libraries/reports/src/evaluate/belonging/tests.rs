@@ -1,3 +1,4 @@
+use metrology::Axis;
 use metrology::sample::{Sense, TestKind, TestPlane};
 
 use super::*;
