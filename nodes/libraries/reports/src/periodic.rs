@@ -344,6 +344,8 @@ mod tests {
             up_mm: vec![vec![0.0; 9]; 5],
             down_mm: vec![vec![0.0; 9]; 5],
             left_out: vec![],
+            mean_mm: 0.0,
+            outlying: Default::default(),
             compensated: false,
             longest_rest: None,
         };

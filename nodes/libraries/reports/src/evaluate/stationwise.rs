@@ -187,6 +187,8 @@ impl Stationwise {
 
 #[cfg(test)]
 mod tests {
+    use metrology::{AxisSet, PerAxis};
+
     use super::*;
 
     fn circle(begin: bool) -> TestSegment {
@@ -222,13 +224,6 @@ mod tests {
             assert!(reasons.join("; ").contains(words), "{refused:?}");
         }
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use metrology::{AxisSet, PerAxis};
-
-    use super::*;
 
     #[test]
     fn the_rest_at_a_station_is_that_of_the_program() {

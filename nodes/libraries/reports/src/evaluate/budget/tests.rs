@@ -92,7 +92,7 @@ fn a_body_is_as_warm_as_it_is_stated_or_as_its_thermometers_read_during_the_test
             ("bed".to_owned(), readings(&[22.0, degc])),
             ("nut_x".to_owned(), readings(&[22.0])),
         ]);
-        let found = budget.machine.temperature(&read);
+        let found = budget.machine_body().temperature(&read);
         assert_eq!(found.is_ok(), is_known, "{degc}");
         if let Err(why) = found {
             let words = format!("temperature/bed read {degc} °C");
