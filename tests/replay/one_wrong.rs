@@ -55,7 +55,7 @@ fn one_state_of_another_machine_or_place_costs_no_target() {
     let whole = report(&home.path().join("bag"));
     let ways: [(fn(&mut AxisState), &str); 2] = [
         (
-            |it| it.axes = ["Y", "Z", "A"].map(str::to_owned).to_vec(),
+            |it| it.axis = ["Y", "Z", "A"].map(str::to_owned).to_vec(),
             "other_machine",
         ),
         (|it| it.commanded[0] = 0.0, "outlier"),
