@@ -584,6 +584,8 @@ pub fn machine_for(map: &Map) -> String {
     text
 }
 
+#[cfg(test)]
+mod cells;
 mod epochs;
 mod likely;
 mod looked;

@@ -399,7 +399,7 @@ mod tests {
             let channels = [Channel::GridU, Channel::GridV, Channel::Touch];
             let inflation = channels.into_iter().zip(ratios).collect();
             let mut notes = vec![];
-            let is_reproduced = !judge(&inflation, &config, &mut notes).has_failed();
+            let is_reproduced = !judge(&inflation, &config, true, &mut notes).has_failed();
             let words: Vec<String> = notes.iter().map(ToString::to_string).collect();
             (is_reproduced, words.join("; "))
         };
