@@ -12,6 +12,7 @@ use twin::effects::{self, Target};
 use crate::judgement::cause::{Member, Scope};
 use crate::judgement::{Check, CheckId};
 use crate::noise::stack::Stack;
+use crate::noise::unrepeated;
 use crate::report::figures::Note;
 use crate::search::rows::count;
 use crate::search::signature::{Instance, Library};
@@ -66,19 +67,25 @@ pub(crate) fn shifts(scope: &Scope<'_, '_>, thermometers: &[Note]) -> Vec<Instan
         .collect()
 }
 
-/// Adds the check to the members of a session of logs that go with thermometers.
+/// Adds the check to the members of a session of logs that go with thermometers. Of logs that nothing repeats an event is not named
+/// beside thermometers either: a body that warms slowly looks like one.
 pub(crate) fn check(
-    stack: &Stack<'_>,
+    scope: &Scope<'_, '_>,
     signatures: &Library,
     members: &mut [Member],
     thermometers: &[Note],
 ) {
+    let stack = scope.stack;
     if !log::is_of_logs(stack) {
         return;
     }
+    let has_temperatures = !stack.session.history.temperature_degc.is_empty();
+    let is_open = has_temperatures && unrepeated::is_assumed(scope.noise);
     for member in members {
         let instance = &signatures.instances[signatures.forms[member.form].instance];
-        if let Some(drivers) = drivers(stack, instance, thermometers) {
+        let is_event = EVENTS.contains(&instance.kind.id);
+        let by_none = (is_event && is_open).then_some(0);
+        if let Some(drivers) = drivers(stack, instance, thermometers).or(by_none) {
             let check = Check::new(CheckId::OwnThermometer, drivers > 0);
             member.put(check.with(count(drivers), 1.0));
         }

@@ -166,7 +166,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     }
     let forms = isolability::forms(&signatures, &normal, &best.set);
     let mut members = veto::judged(scope, &signatures, &normal, &best, &forms, is_closed);
-    by_thermometer::check(stack, &signatures, &mut members, &thermometers);
+    by_thermometer::check(scope, &signatures, &mut members, &thermometers);
     unresolved::list_periodic(stack, &signatures, &mut members);
     resize(stack, &signatures, &normal, &mut members);
     while leave_out_small(stack, &signatures, &mut members) {

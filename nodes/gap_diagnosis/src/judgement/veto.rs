@@ -100,7 +100,7 @@ impl fmt::Display for Veto {
             Self::NotDetermined => f.write_str("the recording does not determine its size"),
             Self::SmallBesideLeft => f.write_str("much more than it explains stays unexplained"),
             Self::OtherThermometer => {
-                f.write_str("the log goes with thermometers that do not drive it")
+                f.write_str("no thermometer that the log goes with drives it")
             }
             Self::NoiseFloor => f.write_str("the noise is not that of the repeats"),
         }

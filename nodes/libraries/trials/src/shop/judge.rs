@@ -32,6 +32,8 @@ pub fn answer(report: &GapReport, page: &str) -> Answer {
 /// Thermometers in the remarks of a page.
 #[must_use]
 pub fn follows_in(page: &str) -> Vec<Follow> {
+    // People read another sign than numbers are written with.
+    let page = page.replace('\u{2212}', "-");
     let remarks = page.lines().filter_map(|line| {
         let (channel, rest) = line.split_once(" goes with ")?;
         let is_remark = !channel.trim().contains(' ') && rest.contains("µm/K");
@@ -212,7 +214,7 @@ mod tests {
 
     #[test]
     fn remarks_of_thermometers_are_read_and_tables_are_not() {
-        let page = "length.Z goes with rear lagged by 44.4 min, 1.20 µm/K, and with bed without a lag, -3.2 µm/K: on runs\n\
+        let page = "length.Z goes with rear lagged by 44.4 min, 1.20 µm/K, and with bed without a lag, −3.2 µm/K: on runs\n\
             most of it is in length.Z and goes with time; 3 µm/K\n";
         let found = follows_in(page);
         assert_eq!(found.len(), 2);
