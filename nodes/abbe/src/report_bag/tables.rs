@@ -5,6 +5,7 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::import::Import;
+mod alone;
 mod odd;
 
 const REFERENCE: &str = include_str!("../../../../tests/validation/iso230_tables.json");
@@ -428,66 +429,6 @@ fn the_resolution_that_a_map_states_is_in_the_bag() {
     assert_eq!(
         String::from_utf8(stated.data).unwrap(),
         "resolution_um: 10.0\n"
-    );
-}
-
-/// The page of a table alone: no map, no machine file.
-fn reported_alone(table: &Path) -> (Report, Vec<String>) {
-    let taken = from_table::of(table, None).unwrap().unwrap();
-    let tests = Tests {
-        machine: None,
-        ..Tests::of(&Bag::open(&taken.bag).unwrap())
-    };
-    let mut report = page("Tests", &tests, None).unwrap();
-    report.begin_with_table(&taken.lines);
-    (report, taken.lines.clone())
-}
-
-#[test]
-fn val_a_table_alone_has_the_figures_of_its_standard() {
-    for table in ["positioning.csv", "wide.xlsx"] {
-        let (report, lines) = reported_alone(&root(&format!("tests/import/{table}")));
-        let linear = found(&report, "iso230_2");
-        for (key, name) in [("accuracy", "a"), ("repeatability", "r"), ("reversal", "b")] {
-            near(
-                &linear[key]["value_mm"],
-                1e3,
-                reference("positioning", name),
-            );
-        }
-        let text = report.terminal();
-        assert!(
-            text.starts_with(&format!("Tests\n\n{}", lines[0])),
-            "{text}"
-        );
-        assert!(
-            lines
-                .iter()
-                .any(|line| line.starts_with("not in the table: axis")),
-            "{lines:?}"
-        );
-    }
-    let (report, lines) = reported_alone(&root("tests/import/drift.csv"));
-    let log = found(&report, "iso230_3_log");
-    near(
-        &log["figures"]["after_1_h"]["value_mm"],
-        1e3,
-        reference("drift", "after_1_h"),
-    );
-    assert!(lines.contains(&"axis Z".to_owned()), "{lines:?}");
-    let (report, _) = reported_alone(&root("tests/import/rotary.csv"));
-    let figures = &found(&report, "iso230_2_rotary")["figures"];
-    let arcsec = 648_000.0 / std::f64::consts::PI;
-    near(
-        &figures["both"]["accuracy"]["value_rad"],
-        arcsec,
-        reference("rotary", "a"),
-    );
-    let (report, _) = reported_alone(&root("tests/import/ballbar.csv"));
-    assert!(
-        report.terminal().contains("ISO 230-4"),
-        "{}",
-        report.terminal()
     );
 }
 
