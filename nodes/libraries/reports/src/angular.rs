@@ -158,7 +158,8 @@ fn answer(result: &RotaryResult, stated: bool) -> String {
 fn in_words(remark: &RotaryRemark) -> String {
     match remark {
         RotaryRemark::FewRuns { n_runs, required } => {
-            format!("{n_runs} runs in each direction; the standard asks for {required}.")
+            let runs = if *n_runs == 1 { "run" } else { "runs" };
+            format!("{n_runs} {runs} in each direction; the standard asks for {required}.")
         }
         RotaryRemark::FewTargets {
             n_targets,
@@ -186,15 +187,12 @@ fn table(result: &RotaryResult, stated: bool) -> Rows {
         let cells = values.map(|value| cell(value, stated));
         std::iter::once(name.to_owned()).chain(cells).collect()
     };
-    let of_scatter = |name: &str, values: [Option<Option<ExpandedAngle>>; 3]| {
-        row(name, values.map(Option::flatten))
-    };
-    let accuracy = of_scatter(
+    let accuracy = row(
         "accuracy A",
         [
-            up.map(|one| one.accuracy),
-            down.map(|one| one.accuracy),
-            both.map(|one| one.accuracy),
+            up.and_then(|one| one.accuracy),
+            down.and_then(|one| one.accuracy),
+            both.and_then(|one| one.accuracy),
         ],
     );
     let systematic = row(
@@ -205,12 +203,12 @@ fn table(result: &RotaryResult, stated: bool) -> Rows {
             both.map(|one| one.systematic_error),
         ],
     );
-    let repeatability = of_scatter(
+    let repeatability = row(
         "repeatability R",
         [
-            up.map(|one| one.repeatability),
-            down.map(|one| one.repeatability),
-            both.map(|one| one.repeatability),
+            up.and_then(|one| one.repeatability),
+            down.and_then(|one| one.repeatability),
+            both.and_then(|one| one.repeatability),
         ],
     );
     let of_both = |name: &str, value: Option<ExpandedAngle>| row(name, [None, None, value]);
