@@ -29,7 +29,7 @@ enum Content {
 }
 
 /// The forms that are known, one a line.
-const INSTRUMENTS: [Instrument; 4] = [
+static INSTRUMENTS: [Instrument; 4] = [
     Instrument {
         name: "Renishaw laser file (rtl, rta)",
         is_one: renishaw_laser::is_one,
