@@ -7,6 +7,7 @@
 )]
 
 mod blind;
+mod designed;
 mod floor;
 mod page;
 mod series;

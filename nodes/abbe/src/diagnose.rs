@@ -205,7 +205,7 @@ impl Diagnose {
         let judge = |limits: Limits| self.keep.judge_diagnosis(limits, &json, of);
         let alarms = limits.map(judge).transpose()?;
         if let Some(alarms) = &alarms {
-            page.add("alarms", &alarms.section());
+            alarms.add_to(page);
             json["alarms"] = alarms.json();
         }
         Ok((serde_json::to_string_pretty(&json)?, alarms))
@@ -374,6 +374,7 @@ fn beside(
     let remarks = in_no_order.into_iter().chain(recorded.remarks).chain(leaps);
     Ok(Diagnosed {
         diagnosis,
+        omitted: recorded.omitted,
         remarks: remarks.chain(of_simulator).collect(),
         readings: recorded.readings,
         defaults,

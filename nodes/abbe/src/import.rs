@@ -22,8 +22,10 @@ mod again;
 mod angles;
 mod beside;
 mod book;
+mod clock_parts;
 mod dates;
 mod file;
+mod hidden;
 mod instrument;
 mod laser_conditions;
 pub(crate) mod limits;
@@ -34,18 +36,23 @@ mod measured;
 mod motion;
 mod odd;
 mod parted;
+mod pass_names;
 mod passes;
 pub(crate) mod propose;
+mod quantities;
 mod recognise;
 mod renishaw_laser;
+mod returns;
 mod runs;
 mod same;
 mod separators;
 mod sheet;
 mod stated;
+mod statement;
 mod table;
 mod times;
 mod units;
+mod unread;
 mod vocabulary;
 mod writer;
 
@@ -138,7 +145,7 @@ impl Import {
         };
         let map = Named::read(map, "map")?;
         let machine = Named::read(machine, "machine file")?;
-        let imported = import(&self.csv, &map, machine, output)?;
+        let imported = import(&self.csv, (&map, &[]), machine, output)?;
         tell!(
             "{}: {} runs, {} messages",
             output.display(),
@@ -169,11 +176,16 @@ impl Import {
     }
 }
 
-/// Writes the bag of a table.
+/// Writes the bag of a table; `assumed`: keys of the map whose values nobody stated.
 ///
 /// # Errors
 /// As [`Import::execute`].
-pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -> Result<Imported> {
+pub(crate) fn import(
+    csv: &Path,
+    (named, assumed): (&Named, &[String]),
+    machine: Named,
+    output: &Path,
+) -> Result<Imported> {
     let in_map = |error: &dyn std::fmt::Display| {
         let said = yaml::placed(&named.place, &named.text, &error.to_string());
         anyhow!("map {said}")
@@ -197,14 +209,18 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     let mut runs = runs::of(&map.test, &table).with_context(in_table)?;
     let remarks = plausible(&map.test, &machine, &runs).with_context(in_table)?;
     runs.remarks.extend(remarks);
-    let stated = stated(&map, &runs);
     let of_machine = (&machine, machine_text);
     if output.exists() {
         let path = output.to_owned();
         return Err(RecorderError::Exists { path }.into());
     }
     let folder = WholeFolder::begin(output)?;
-    let mut writer = Writer::begin(folder.path(), of_machine, map.start_s, stated)?;
+    let mut writer = Writer::begin(
+        folder.path(),
+        of_machine,
+        map.start_s,
+        Some(stated(&map, assumed, &runs)),
+    )?;
     let n_runs = motion::write(&map, &runs, &mut writer).with_context(in_table)?;
     let written = writer.finish()?;
     folder.finish()?;
@@ -235,13 +251,14 @@ pub(crate) fn is_of_instrument(path: &Path) -> bool {
     bytes.is_some_and(|bytes| instrument::of(&bytes).is_some())
 }
 
-/// What a bag carries of a table beside its readings, as YAML; nothing where there is nothing.
-fn stated(map: &Map, runs: &Runs) -> Option<String> {
-    let resolution = map.resolution();
-    let resolution = resolution.map(|(key, value)| format!("{key}: {value:?}\n"));
-    let order = (!runs.is_order_known).then(|| format!("{ORDER_UNKNOWN}\n"));
-    let lines: Vec<String> = resolution.into_iter().chain(order).collect();
-    (!lines.is_empty()).then(|| lines.concat())
+/// What a bag carries of a table beside its readings, as YAML.
+fn stated(map: &Map, assumed: &[String], runs: &Runs) -> String {
+    let mut stated = map.statement(assumed);
+    if !runs.is_order_known {
+        stated.push_str(ORDER_UNKNOWN);
+        stated.push('\n');
+    }
+    stated
 }
 
 /// Refuses targets beyond the travel; gives remarks about readings that the test cannot have.

@@ -27,6 +27,12 @@ const NOBODY: u32 = 65_534;
 
 /// The machine file with the named effects, in a trial's folder.
 const FOUND: &str = "found.yaml";
+/// The plan that was measured, in the folder of a trial that has a second round.
+pub const PLAN: &str = "plan.yaml";
+/// Folder that the diagnosis may write into.
+pub const TOLD: &str = "told";
+/// Folder of a second round, in the folder of a trial.
+pub const SECOND_ROUND: &str = "told/second_round";
 
 /// What a diagnosis said.
 #[derive(Debug)]
@@ -49,6 +55,8 @@ pub struct Question<'q> {
     pub ablated: Option<Rule>,
     /// Whether the machine file with the named effects is wanted.
     pub writes_machine: bool,
+    /// Minutes of a second round, where one is wanted.
+    pub second_round_min: Option<f64>,
 }
 
 impl Question<'_> {
@@ -84,6 +92,17 @@ pub struct Process {
     pub command: Command,
     /// The program itself, where it is handed over: open until it has ended.
     _handed: Option<File>,
+}
+
+/// Makes the folder that the diagnosis may write into, in a trial's folder.
+///
+/// # Errors
+/// When it cannot be made.
+pub fn make_told(folder: &Path) -> Result<()> {
+    let told = folder.join(TOLD);
+    std::fs::create_dir(&told).with_context(|| format!("{}", told.display()))?;
+    std::fs::set_permissions(&told, std::fs::Permissions::from_mode(0o777))?;
+    Ok(())
 }
 
 /// The diagnosis in a folder: as nobody, where this program runs as root.
@@ -143,6 +162,10 @@ pub fn as_process(folder: &Path, bags: &[&str], question: &Question<'_>) -> Resu
     }
     if let Some(rule) = question.ablated {
         command.args(["--ablate", rule.id()]);
+    }
+    if let Some(minutes) = question.second_round_min {
+        command.args(["--design-next", "--minutes", &minutes.to_string()]);
+        command.args(["--plan", PLAN, "-o", SECOND_ROUND]);
     }
     let output = command.output().context("abbe diagnose")?;
     if !output.status.success() {

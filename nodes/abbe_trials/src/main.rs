@@ -23,14 +23,17 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
 use gap_diagnosis::Rule;
 use sha2::{Digest, Sha256};
+use trials::target::Ratio;
 use trials::truth::MEASURE;
 use trials::{Arm, Verdict};
 
 mod blind;
+mod design;
 mod journal;
 mod later;
 mod programmes;
 mod seal;
+mod second_round;
 mod series;
 mod session_bag;
 mod shop;
@@ -81,7 +84,8 @@ struct Trials {
     /// Arms, by number: i catalogue, ii a class left out, iii different physics, iv null, v null with worse noise,
     /// vi confusable pairs, vii the same with one more run of the diagnosis' choice; alone: each class in turn, large enough to be named;
     /// limit: each class in turn, about as small as can be named; own, own-left-out: classes with programmes of their own;
-    /// s1 a shop's ISO 230-2 run, s2 its ballbar, s3 its logs: with a table of their own.
+    /// s1 a shop's ISO 230-2 run, s2 its ballbar, s3 its logs: with a table of their own; s5 a designed programme, s6 the same with
+    /// a class left out, s7 the same with a designed second round: with a table of their own.
     #[arg(long, value_delimiter = ',', default_value = "i")]
     arm: Vec<Arm>,
     /// Trials in each arm.
@@ -121,6 +125,9 @@ struct Trials {
     /// Keep bags and reports.
     #[arg(long, conflicts_with_all = ["in_process", "tabulate"])]
     keep: bool,
+    /// Journal of `abbe-trials programmes`, of which the table of s5 says what a designed programme names beside a shop's.
+    #[arg(long, value_name = "JOURNAL")]
+    programmes: Option<PathBuf>,
     /// Make no trials: tabulate the journal.
     #[arg(long)]
     tabulate: bool,
@@ -167,6 +174,7 @@ impl Trials {
         let mut journal = Journal::open(&self.out.join("journal.jsonl"))?;
         let arms: BTreeSet<Arm> = self.arm.iter().copied().collect();
         let is_of_a_shop = self.is_of_a_shop(&arms)?;
+        let ratio = self.ratio(&arms)?;
         let made_now = (!self.tabulate).then_some(MEASURE);
         one_measure(journal.verdicts(), seed, made_now)
             .with_context(|| format!("{}", self.out.join("journal.jsonl").display()))?;
@@ -197,7 +205,7 @@ impl Trials {
         if is_of_a_shop {
             self.publish(&shop::Table::of(&arms, seed, &verdicts).contents()?)?;
         } else {
-            let table = table::Table::of(&arms, seed, &verdicts, self.in_process);
+            let table = table::Table::of(&arms, seed, &verdicts, self.in_process, ratio);
             let [terminal, json] = [table.terminal()?, table.json()?];
             self.publish(&[terminal, json, table.html()?, table.markdown()?])?;
         }
@@ -220,6 +228,25 @@ impl Trials {
             );
         }
         Ok(true)
+    }
+
+    /// Checks that arms of designed programmes stand alone, and reads the journal that stands beside them.
+    fn ratio(&self, arms: &BTreeSet<Arm>) -> Result<Option<Ratio>> {
+        let designed = arms.iter().filter(|arm| arm.is_designed()).count();
+        if designed > 0 && designed < arms.len() {
+            bail!("--arm: s5, s6 and s7 have a table of their own; run them without other arms");
+        }
+        if self.in_process && arms.contains(&Arm::DesignedTwoRounds) {
+            bail!("--arm s7: the second round is written by a process; leave out --in-process");
+        }
+        match &self.programmes {
+            Some(path) if designed == 0 => bail!(
+                "--programmes {}: belongs to the table of s5, s6 and s7; leave it out",
+                path.display()
+            ),
+            Some(path) => programmes::ratio(path).map(Some),
+            None => Ok(None),
+        }
     }
 
     /// Prints a table and writes it: for a terminal, as JSON, as a page and as Markdown.

@@ -11,12 +11,12 @@
 //! A shop's circles are read as a ballbar reads them: (u, v) of the plate with (u_0, v_0), the place of its zero, from the
 //! centre of the circle. Wherever the drawn machine records its motors, every programme has them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::OpenOptions;
 use std::io::Write as _;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Stdio};
+use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
@@ -28,21 +28,22 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use sequencer::Plan;
 use serde::{Deserialize, Serialize};
-use trials::{Arm, Compared, Rig, Sample, Trial, TrialError, Verdict, judge, measure};
+use trials::target::Ratio;
+use trials::{Arm, Compared, Rig, Trial, Verdict, judge, timed};
 
 use crate::blind::{self, Question};
+use crate::design;
 
 mod bar;
 mod result;
 
 use bar::Bar;
+pub use result::ratio_words;
 
 /// Machines: each is measured four times for as long as the programmes take.
 const MACHINES: RangeInclusive<u64> = 1..=100_000;
 /// Minutes of a programme.
 const PROGRAMME_MIN: [f64; 2] = [1.0, 240.0];
-/// Instruments of the designed programme.
-const AT_HAND: &str = "grid,laser,probe,thermometers";
 /// What a random programme is drawn with besides the seed of its machine.
 const RANDOM_SALT: u64 = 0x7261_6e64;
 
@@ -154,7 +155,7 @@ impl Programmes {
         let mut builder = SessionBuilder::new(&machine, SessionConfig::default())?;
         let mut bar = which.reads_bar().then(Bar::default);
         builder.next_bag();
-        let program_min = timed(&rig, &mut |sample| {
+        let program_min = timed(&rig, &mut |_, sample| {
             let read = match &mut bar {
                 Some(bar) => bar.read(sample),
                 None => Some(sample),
@@ -206,72 +207,59 @@ impl Programmes {
         let time_min = |plan: &Plan| {
             let mut alone = bare.clone();
             alone.plan = plan.clone();
-            timed(&alone, &mut |_| ())
+            timed(&alone, &mut |_, _| ())
         };
         let planned = which.plan(&rig.machine, self.minutes, &mut random, &time_min)?;
         (rig.plan, rig.programs) = match planned {
             Some(plan) => (plan, BTreeMap::new()),
-            None => self.designed(&rig, trial.truth.index)?,
+            None => {
+                let designed = design::programme(&self.out, &rig.machine_text()?, self.minutes)?;
+                (designed.plan, designed.programs)
+            }
         };
         Ok(rig)
     }
-
-    /// `abbe preflight --design` for the machine file.
-    fn designed(&self, rig: &Rig, index: u64) -> Result<(Plan, BTreeMap<String, String>)> {
-        let home = self.out.join(format!("designed-{}-{index}", self.seed));
-        if home.exists() {
-            std::fs::remove_dir_all(&home).with_context(|| format!("{}", home.display()))?;
-        }
-        std::fs::create_dir_all(&home).with_context(|| format!("{}", home.display()))?;
-        std::fs::write(home.join("drawn.yaml"), rig.machine_text()?)?;
-        let program = std::env::current_exe().context("path of this program")?;
-        let output = Command::new(program)
-            .args(["preflight", "--design", "--machine", "drawn.yaml"])
-            .args(["--minutes", &self.minutes.to_string(), "--with", AT_HAND])
-            .args(["-o", "designed", "--json"])
-            .current_dir(&home)
-            .stdin(Stdio::null())
-            .output()
-            .context("abbe preflight --design")?;
-        if !output.status.success() {
-            let told = String::from_utf8_lossy(&output.stderr);
-            bail!(
-                "abbe preflight --design: {}: {}",
-                output.status,
-                told.trim()
-            );
-        }
-        let folder = home.join("designed");
-        let plan = Plan::from_yaml(&text_file::yaml(&folder.join("plan.yaml"))?)?;
-        Ok((plan, programs(&folder)?))
-    }
 }
 
-/// Part programs of a folder, by name.
-fn programs(folder: &Path) -> Result<BTreeMap<String, String>> {
-    let entries = std::fs::read_dir(folder).with_context(|| format!("{}", folder.display()))?;
-    let mut programs = BTreeMap::new();
-    for entry in entries {
-        let path = entry?.path();
-        if path.extension().is_some_and(|ending| ending == "ngc") {
-            let text = text_file::read(&path, text_file::Comments::Gcode)?;
-            let name = path.file_name().unwrap_or_default();
-            let _ = programs.insert(name.to_string_lossy().into_owned(), text);
-        }
+/// Effects that the designed programme names beside a shop's, by a journal of one series.
+///
+/// # Errors
+/// When it cannot be read, is empty, or is of several series.
+pub fn ratio(path: &Path) -> Result<Ratio> {
+    let all = journal(path)?;
+    let Some(first) = all.first() else {
+        bail!(
+            "--programmes {}: no programme was judged there: make it with `abbe-trials programmes`",
+            path.display()
+        );
+    };
+    let seed = first.verdict.truth.seed;
+    let is_same = |judged: &Judged| {
+        judged.verdict.truth.seed == seed && (judged.minutes - first.minutes).abs() < 1e-9
+    };
+    if !all.iter().all(is_same) {
+        bail!(
+            "--programmes {}: has several seeds or minutes: name the journal of one series",
+            path.display()
+        );
     }
-    Ok(programs)
+    let minutes = first.minutes;
+    let both = beside_a_shop(all);
+    Ok(result::Table::of(seed, minutes, &both).ratio())
 }
 
-/// Measures, and says how long it took on the machine, min.
-fn timed(rig: &Rig, take: &mut dyn FnMut(Sample)) -> Result<f64, TrialError> {
-    let mut last_nanos = 0;
-    let mut first_nanos = None;
-    measure(rig, &mut |at, sample| {
-        let _ = first_nanos.get_or_insert(at.nanos());
-        last_nanos = last_nanos.max(at.nanos());
-        take(sample);
-    })?;
-    Ok((last_nanos - first_nanos.unwrap_or(last_nanos)) as f64 * 1e-9 / 60.0)
+/// Machines that were measured by the designed programme and by a shop's.
+fn beside_a_shop(mut all: Vec<Judged>) -> Vec<Judged> {
+    let of = |wanted: Compared| -> BTreeSet<u64> {
+        let own = all.iter().filter(|judged| judged.programme == wanted);
+        own.map(|judged| judged.verdict.truth.index).collect()
+    };
+    let [designed, shop] = [Compared::Designed, Compared::Shop].map(of);
+    all.retain(|judged| {
+        let index = judged.verdict.truth.index;
+        designed.contains(&index) && shop.contains(&index)
+    });
+    all
 }
 
 /// The lines of a journal; a last one that was cut short is an error that names it.

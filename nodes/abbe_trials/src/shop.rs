@@ -1,7 +1,6 @@
 //! A trial on a shop's session: its tables are imported by the product, and diagnosed as a process.
 
 use std::collections::BTreeMap;
-use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
@@ -21,8 +20,7 @@ mod ten_lines;
 
 pub use page::Table;
 
-/// Folder that the diagnosis may write into, and its report there.
-const TOLD: &str = "told";
+/// The report, where the diagnosis may write.
 const REPORT: &str = "told/gap.json";
 /// Done, and done with a part of the input left out.
 const DONE: [i32; 2] = [0, 3];
@@ -91,10 +89,7 @@ fn write(session: &ShopSession, folder: &Path) -> Result<()> {
         std::fs::write(folder.join(format!("{}.csv", table.name)), &table.text)?;
         std::fs::write(folder.join(format!("{}.yaml", table.name)), &table.map)?;
     }
-    let told = folder.join(TOLD);
-    std::fs::create_dir(&told)?;
-    std::fs::set_permissions(&told, std::fs::Permissions::from_mode(0o777))?;
-    Ok(())
+    blind::make_told(folder)
 }
 
 /// Makes a bag of every table, named as it is.

@@ -10,17 +10,25 @@ use reports::screen::Screen;
 use reports::section::{Rows, Section};
 use serde::Serialize;
 use trials::comparison::{MethodLine, ablations};
+use trials::designed::Overview;
+use trials::proportion::Proportion;
 use trials::tally::{Figure, unknown_auroc};
-use trials::target::{Target, targets};
+use trials::target::{Ratio, Target, of_designed, targets};
 use trials::{Arm, Tally, Verdict};
 
 mod arm;
 mod confusion;
+mod designed;
 mod protocol;
 mod reliability;
 
-/// Trials of an arm below which a table says that it is a small run.
-const SMALL: usize = 500;
+/// Trials of an arm below which a table says that it is a small run: of all arms, and of those of designed programmes.
+const SMALL: [usize; 2] = [500, 300];
+/// Arms with a class left out, each beside the one that its unknown score is compared with.
+const UNKNOWN: [[Arm; 2]; 2] = [
+    [Arm::LeftOut, Arm::Catalogue],
+    [Arm::DesignedLeftOut, Arm::Designed],
+];
 
 /// The table.
 #[derive(Serialize)]
@@ -30,50 +38,66 @@ pub struct Table {
     in_process: bool,
     trials: usize,
     machine: String,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    first_lines: Vec<String>,
     targets: Vec<Target>,
     arms: Vec<Tally>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    programmes: Vec<Overview>,
     ablations: Vec<(Arm, Vec<MethodLine>)>,
     unknown: Vec<Figure>,
     refusals: Vec<(String, usize)>,
 }
 
 impl Table {
-    /// Tallies verdicts arm by arm.
-    pub fn of(arms: &BTreeSet<Arm>, seed: u64, all: &[Verdict], in_process: bool) -> Self {
+    /// Tallies verdicts arm by arm; `ratio` is of the journal of programmes.
+    pub fn of(
+        arms: &BTreeSet<Arm>,
+        seed: u64,
+        all: &[Verdict],
+        in_process: bool,
+        ratio: Option<Ratio>,
+    ) -> Self {
         let whole = all.iter().filter(|v| v.ablated.is_none());
         let verdicts: Vec<Verdict> = whole.cloned().collect();
         let commits: BTreeSet<&str> = verdicts.iter().map(|v| v.commit.as_str()).collect();
         let commit = commits.into_iter().collect::<Vec<_>>().join(", ");
-        let has_both = [Arm::LeftOut, Arm::Catalogue]
-            .iter()
-            .all(|arm| arms.contains(arm));
-        let mut refusals = Vec::<(String, usize)>::new();
-        for reason in verdicts.iter().filter_map(|v| v.refused.clone()) {
-            match refusals.iter_mut().find(|(known, _)| *known == reason) {
-                Some((_, count)) => *count += 1,
-                None => refusals.push((reason, 1)),
-            }
-        }
-        Self {
+        let is_designed = arms.iter().any(|arm| arm.is_designed());
+        let unknown = UNKNOWN
+            .into_iter()
+            .filter(|both| both.iter().all(|arm| arms.contains(arm)));
+        let mut table = Self {
             commit,
             seed,
             in_process,
             trials: verdicts.len(),
             machine: computer(),
-            targets: targets(&verdicts),
+            first_lines: vec![],
+            targets: if is_designed {
+                of_designed(&verdicts, ratio)
+            } else {
+                targets(&verdicts)
+            },
             ablations: arms
                 .iter()
                 .map(|arm| (*arm, ablations(*arm, all)))
                 .filter(|(_, lines)| !lines.is_empty())
                 .collect(),
             arms: arms.iter().map(|arm| Tally::of(*arm, &verdicts)).collect(),
-            unknown: if has_both {
-                [0.0, 10.0].map(|d| unknown_auroc(&verdicts, d)).to_vec()
-            } else {
-                vec![]
-            },
-            refusals,
+            programmes: arms
+                .iter()
+                .filter(|arm| arm.is_designed())
+                .map(|arm| Overview::of(*arm, &verdicts))
+                .collect(),
+            unknown: unknown
+                .flat_map(|both| [0.0, 10.0].map(|d| unknown_auroc(&verdicts, both, d)))
+                .collect(),
+            refusals: refusals(&verdicts),
+        };
+        if is_designed {
+            table.first_lines = designed::ten_lines(&table, ratio);
         }
+        table
     }
 
     /// As it stands on a terminal.
@@ -105,11 +129,14 @@ impl Table {
     pub fn html(&self) -> Result<String> {
         let (lines, parts) = (self.lines(), self.parts()?);
         let report = Report {
-            title: TITLE.to_owned(),
+            title: self.title().to_owned(),
             lines: vec![],
             parts: vec![],
             screen: Screen::default(),
             body: html! {
+                @if !self.first_lines.is_empty() {
+                    ol { @for line in &self.first_lines { li { (line) } } }
+                }
                 @for line in &lines { p { (line) } }
                 @for part in &parts {
                     (part.section.html())
@@ -126,13 +153,26 @@ impl Table {
     /// # Errors
     /// When a diagram cannot be drawn.
     pub fn markdown(&self) -> Result<String> {
-        let mut text = format!("# {TITLE}\n\n");
+        let mut text = format!("# {}\n\n", self.title());
+        append_numbered(&mut text, &self.first_lines);
         for line in self.lines() {
             let _ = writeln!(text, "{line}\n");
         }
         let sections: Vec<Section> = self.parts()?.into_iter().map(Part::in_text).collect();
         append_markdown(&mut text, &sections);
         Ok(text)
+    }
+
+    fn is_designed(&self) -> bool {
+        !self.programmes.is_empty()
+    }
+
+    fn title(&self) -> &'static str {
+        if self.is_designed() {
+            DESIGNED_TITLE
+        } else {
+            TITLE
+        }
     }
 
     fn lines(&self) -> Vec<String> {
@@ -146,9 +186,10 @@ impl Table {
             );
         }
         let least = self.arms.iter().map(|arm| arm.trials).min().unwrap_or(0);
-        if least < SMALL {
+        let wanted = SMALL[usize::from(self.is_designed())];
+        if least < wanted {
             lines.push(format!(
-                "A small run: {least} trials in the smallest arm, of at least {SMALL} that are wanted. Intervals are Wilson's, 95 %."
+                "A small run: {least} trials in the smallest arm, of at least {wanted} that are wanted. Intervals are Wilson's, 95 %."
             ));
         }
         for (reason, count) in &self.refusals {
@@ -159,6 +200,8 @@ impl Table {
 
     fn parts(&self) -> Result<Vec<Part<'_>>> {
         let mut parts = vec![Part::plain(protocol::section(&self.targets))];
+        let programmes = self.programmes.iter();
+        parts.extend(programmes.map(|overview| Part::plain(designed::section(overview))));
         for tally in &self.arms {
             parts.push(Part {
                 section: arm::section(tally)?,
@@ -199,6 +242,31 @@ impl Part<'_> {
 }
 
 const TITLE: &str = "Blind trials of the diagnosis";
+const DESIGNED_TITLE: &str = "Blind trials of designed programmes";
+
+/// Reasons of refusals, each with how often.
+fn refusals(verdicts: &[Verdict]) -> Vec<(String, usize)> {
+    let mut refusals = Vec::<(String, usize)>::new();
+    for reason in verdicts.iter().filter_map(|v| v.refused.clone()) {
+        match refusals.iter_mut().find(|(known, _)| *known == reason) {
+            Some((_, count)) => *count += 1,
+            None => refusals.push((reason, 1)),
+        }
+    }
+    refusals
+}
+
+/// A share for a sentence.
+pub(crate) fn percent(count: Proportion) -> String {
+    let share = count.share();
+    share.map_or_else(
+        || NOT_TRIED.to_owned(),
+        |share| format!("{:.0} %", 100.0 * share),
+    )
+}
+
+/// What stands where nothing was tried.
+pub(crate) const NOT_TRIED: &str = "not tried";
 
 /// What it ran on.
 pub(crate) fn computer() -> String {
@@ -209,6 +277,16 @@ pub(crate) fn computer() -> String {
         .find_map(|line| line.strip_prefix("model name")?.split_once(": "));
     let name = model.map_or("a processor without a name", |(_, name)| name.trim());
     format!("{cores} cores of {name}")
+}
+
+/// Appends the lines that a page begins with, numbered.
+pub(crate) fn append_numbered(text: &mut String, lines: &[String]) {
+    for (number, line) in lines.iter().enumerate() {
+        let _ = writeln!(text, "{}. {line}", number + 1);
+    }
+    if !lines.is_empty() {
+        text.push('\n');
+    }
 }
 
 /// Appends sections as Markdown, which ends with one line break.

@@ -7,12 +7,13 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use gap_diagnosis::Rule;
 use gap_diagnosis::report::Status;
-use sequencer::extra_run;
+use trials::designed::SECOND_ROUND_MIN;
 use trials::{Arm, Rig, Second, Trial, Truth, Verdict, judge, likeness};
 
 use crate::blind::{self, Beside, Diagnosed, Question};
 use crate::seal::Seal;
-use crate::{later, session_bag, shop};
+use crate::second_round::second;
+use crate::{design, later, session_bag, shop};
 
 /// How trials are made.
 pub struct How {
@@ -45,18 +46,30 @@ impl Which<'_> {
     fn has_oracle(&self) -> bool {
         matches!(
             self.arm,
-            Arm::Catalogue | Arm::Foreign | Arm::Alone | Arm::Own
+            Arm::Catalogue | Arm::Foreign | Arm::Alone | Arm::Own | Arm::Designed
         )
     }
 
     /// Whether its interval of the gap closed is judged on later runs.
     fn has_later_runs(&self) -> bool {
-        matches!(self.arm, Arm::Catalogue | Arm::Foreign)
+        matches!(self.arm, Arm::Catalogue | Arm::Foreign | Arm::Designed)
+    }
+
+    /// How the diagnosis is asked without a rule, or with all.
+    fn question<'q>(&self, left_out: Option<&'q str>, rule: Option<Rule>) -> Question<'q> {
+        let is_whole = rule.is_none();
+        let has_rounds = is_whole && self.arm == Arm::DesignedTwoRounds;
+        Question {
+            left_out,
+            ablated: rule,
+            writes_machine: is_whole && self.has_later_runs(),
+            second_round_min: has_rounds.then_some(SECOND_ROUND_MIN),
+        }
     }
 }
 
 /// A diagnosis with the rule that was off and the time it took with its program and bag, s.
-type Answer = (Option<Rule>, Diagnosed, f64);
+pub type Answer = (Option<Rule>, Diagnosed, f64);
 
 /// Everything that was said of a trial before its seal is opened.
 struct Said {
@@ -77,7 +90,7 @@ impl How {
             return shop::trial(self, which, tell);
         }
         let began = Instant::now();
-        let mut trial = Trial::draw(which.arm, which.seed, which.index)?;
+        let mut trial = self.drawn(which)?;
         if which.has_oracle() && !trial.truth.effects.is_empty() {
             trial.truth.bare_um = blind::bare_um(&trial.bare)?;
         }
@@ -93,6 +106,10 @@ impl How {
         let machine_text = trial.rig.machine_text()?;
         std::fs::write(folder.join("machine.yaml"), &machine_text)?;
         session_bag::write(&trial.rig, &folder.join("bag"), machine_text.clone())?;
+        if which.arm == Arm::DesignedTwoRounds {
+            std::fs::write(folder.join(blind::PLAN), trial.rig.plan_text()?)?;
+            blind::make_told(&folder)?;
+        }
         let seal = Seal::write(&self.sealed, &name, &trial.truth)?;
         let left_out = trial.truth.left_out.clone();
         let rig = trial.rig;
@@ -100,11 +117,7 @@ impl How {
         let making_s = began.elapsed().as_secs_f64();
         let mut answers = vec![];
         for rule in which.rules {
-            let question = Question {
-                left_out: left_out.as_deref(),
-                ablated: *rule,
-                writes_machine: rule.is_none() && which.has_later_runs(),
-            };
+            let question = which.question(left_out.as_deref(), *rule);
             let began = Instant::now();
             let diagnosed = blind::as_process(&folder, &["bag"], &question)?;
             answers.push((*rule, diagnosed, began.elapsed().as_secs_f64()));
@@ -112,7 +125,7 @@ impl How {
         if self.keep {
             keep(&folder, &answers)?;
         }
-        let second = second(which, &answers, &rig, &|later| {
+        let second = second(which.arm, &answers, (&rig, &folder), &|later| {
             session_bag::write(later, &folder.join("bag_2"), machine_text.clone())?;
             blind::as_process(&folder, &["bag", "bag_2"], &Question::default())
         })?;
@@ -134,17 +147,24 @@ impl How {
         Ok(verdicts(&seal.open()?, &seal.sha256, said))
     }
 
+    /// The machine with what it hides and the programme that measures it.
+    fn drawn(&self, which: &Which<'_>) -> Result<Trial> {
+        let trial = Trial::draw(which.arm, which.seed, which.index)?;
+        if !which.arm.is_designed() {
+            return Ok(trial);
+        }
+        let minutes = trials::designed::minutes(which.index);
+        let programme = design::programme(&self.out, &trial.rig.machine_text()?, minutes)?;
+        Ok(trial.measured_by(&programme)?)
+    }
+
     /// Without bag, seal and process.
     fn within(&self, which: &Which<'_>, trial: Trial, began: Instant) -> Result<Vec<Verdict>> {
         let left_out = trial.truth.left_out.clone();
         let recording = blind::recorded(&[&trial.rig])?;
         let making_s = began.elapsed().as_secs_f64();
         let answer = |rule: &Option<Rule>| {
-            let question = Question {
-                left_out: left_out.as_deref(),
-                ablated: *rule,
-                writes_machine: rule.is_none() && which.has_later_runs(),
-            };
+            let question = which.question(left_out.as_deref(), *rule);
             let began = Instant::now();
             let diagnosed = match &recording {
                 Ok(recording) => blind::in_process(recording, &question),
@@ -153,7 +173,8 @@ impl How {
             (*rule, diagnosed, began.elapsed().as_secs_f64())
         };
         let answers: Vec<Answer> = which.rules.iter().map(answer).collect();
-        let second = second(which, &answers, &trial.rig, &|later| {
+        let nowhere = Path::new("");
+        let second = second(which.arm, &answers, (&trial.rig, nowhere), &|later| {
             Ok(match blind::recorded(&[&trial.rig, later])? {
                 Ok(recording) => blind::in_process(&recording, &Question::default()),
                 Err(reason) => Err(reason),
@@ -188,39 +209,6 @@ fn keep(folder: &Path, answers: &[Answer]) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// The second round of an arm that has one: what the first diagnosis asks for is run, and both are diagnosed.
-fn second(
-    which: &Which<'_>,
-    answers: &[Answer],
-    rig: &Rig,
-    ask: &dyn Fn(&Rig) -> Result<Diagnosed>,
-) -> Result<Option<Second>> {
-    let first = answers.iter().find(|(rule, ..)| rule.is_none());
-    let Some((_, Ok(answer), _)) = first.filter(|_| which.arm == Arm::TwoRounds) else {
-        return Ok(None);
-    };
-    let Some(next) = answer.report.next_experiments.first() else {
-        return Ok(None);
-    };
-    let diagnosed = match extra_run(&rig.machine, &rig.plan, &next.run) {
-        Some(plan) => ask(&rig.later(plan)),
-        None => Ok(Err("this machine's plan cannot do that run".to_owned())),
-    };
-    // A run that is too fast or too wide for the machine is refused by its control: that is the diagnosis' mistake.
-    let diagnosed: Diagnosed = diagnosed.unwrap_or_else(|error| Err(format!("{error:#}")));
-    let (said, refused) = match diagnosed {
-        Ok(answer) => (Some(judge(&answer.report)), None),
-        Err(reason) => (None, Some(reason)),
-    };
-    Ok(Some(Second {
-        run: next.run.clone(),
-        separates: next.separates.clone(),
-        delta: next.delta,
-        said,
-        refused,
-    }))
 }
 
 /// What the named effects close on later runs, where each of them stands alone.

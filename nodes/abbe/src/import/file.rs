@@ -76,7 +76,15 @@ fn of_xlsx(bytes: Vec<u8>, form: Form<'_>, is_table: &dyn Fn(&Sheet) -> bool) ->
             bytes.len()
         );
     }
-    book::check(&bytes)?;
+    let mut hidden = book::check(&bytes)?;
+    let mut cells = of_book(bytes, form, is_table)?;
+    hidden.extend(cells.note.take());
+    cells.note = (!hidden.is_empty()).then(|| hidden.join("; "));
+    Ok(cells)
+}
+
+/// The cells of a worksheet of a workbook that was checked.
+fn of_book(bytes: Vec<u8>, form: Form<'_>, is_table: &dyn Fn(&Sheet) -> bool) -> Result<Cells> {
     let mut book = Xlsx::new(Cursor::new(bytes)).context("xlsx")?;
     let names = book.sheet_names();
     if let Some(name) = form.sheet {
@@ -316,6 +324,19 @@ mod tests {
             said.contains("no such worksheet, it has Empty, Laser"),
             "{said}"
         );
+    }
+
+    #[test]
+    fn hidden_rows_and_columns_are_said_with_their_number() {
+        let cells = "<cols><col min='2' max='9' hidden='1'/></cols><sheetData><row r='1'><c r='A1'><v>1</v></c><c r='B1'><v>1</v></c></row><row r='2' hidden='1'><c r='A2'><v>1</v></c></row></sheetData>";
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("a.xlsx");
+        std::fs::write(&path, workbook(cells)).unwrap();
+        let note = super::read(&path, form('.'), &any).unwrap().note.unwrap();
+        let begin = "warning, xl/worksheets/sheet1.xml: 1 rows and 1 columns are hidden";
+        assert!(note.starts_with(begin), "{note}");
+        std::fs::write(&path, workbook(&numbered(7))).unwrap();
+        assert_eq!(super::read(&path, form('.'), &any).unwrap().note, None);
     }
 
     #[test]

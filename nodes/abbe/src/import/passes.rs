@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use anyhow::{Result, bail};
 
+use super::returns;
 use super::runs::{GRID_MM, Runs, gathered, ways};
 use super::table::Row;
 
@@ -135,6 +136,14 @@ pub fn are_rows(runs: &[Vec<Row>]) -> bool {
 /// # Errors
 /// With the line where the rows are neither in the order of the measurement nor have a column of the direction.
 pub fn repetitions(rows: Vec<Row>) -> Result<Runs> {
+    let is_told = rows.first().is_some_and(|row| row.cells.len() > 3);
+    if let Some((runs, remark)) = returns::apart(&rows).filter(|_| !is_told) {
+        return Ok(Runs {
+            runs,
+            remarks: vec![remark],
+            is_order_known: true,
+        });
+    }
     let mut visits: BTreeMap<(i64, bool), f64> = BTreeMap::new();
     let ways = ways(&rows);
     let mut numbered = vec![];

@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail};
 use metrology::Axis;
 
 use super::map::{Direction, Map, Plane, Test, units};
+use super::pass_names;
 use super::recognise::{Known, Recognised, Role};
 use super::separators;
 use super::stated::{in_one_line, quoted};
@@ -24,6 +25,8 @@ pub struct Proposal {
     pub recognised: Vec<String>,
     /// What the table lacks, a line each.
     pub needed: Vec<String>,
+    /// Keys whose values are assumed.
+    pub assumed: Vec<String>,
 }
 
 /// Proposes a map for a table.
@@ -52,16 +55,13 @@ pub fn of(path: &Path) -> Result<Proposal> {
         Some(Of::Positioning) => text.positioning(axis)?,
         Some(Of::Log) => text.log(axis)?,
         Some(Of::Circle) => text.circle()?,
-        None => bail!(
-            "{}columns {}: neither targets with deviations, nor a time with a displacement, nor angles with radial deviations: write a map (docs/reference/scenario.md#import-map)",
-            sign::unsure(&found),
-            names(&found).join(", ")
-        ),
+        None => bail!("{}", nothing::in_words(&found)),
     };
     Ok(Proposal {
         map: text.finished(),
         recognised: text.recognised,
         needed: text.needed,
+        assumed: text.assumed,
     })
 }
 
@@ -102,6 +102,7 @@ struct Text<'t> {
     start_s: f64,
     recognised: Vec<String>,
     needed: Vec<String>,
+    assumed: Vec<String>,
 }
 
 impl<'t> Text<'t> {
@@ -135,21 +136,42 @@ impl<'t> Text<'t> {
             start_s: 0.0,
             recognised: vec![said],
             needed: vec![],
+            assumed: vec![],
         }
     }
 
     /// Names a column under a key.
     fn column(&mut self, key: &str, column: &Known) {
-        self.used.push(column.name.clone());
         let _ = writeln!(self.test, "    {key}: {}", quoted(&column.name));
-        self.recognised
-            .push(format!("{key}: column \"{}\"", column.name));
+        self.note(key, column);
+    }
+
+    /// Notes which column gave what a key holds.
+    fn note(&mut self, key: &str, column: &Known) {
+        self.used.push(column.name.clone());
+        let name = &column.name;
+        self.recognised.push(format!("{key}: column \"{name}\""));
+    }
+
+    /// Names the column that is read under a key, and says which other ones fit as well.
+    fn read(&mut self, key: &str, column: &Known) {
+        self.column(key, column);
+        let others = self.found.as_plain(column);
+        let others: Vec<String> = others.map(|other| format!("\"{}\"", other.name)).collect();
+        if !others.is_empty() {
+            self.needed.push(format!(
+                "column \"{}\": read as {key}, and {} by name could be it as well: name the one that is meant in a map",
+                column.name,
+                others.join(", ")
+            ));
+        }
     }
 
     /// Lists what the table lacks.
     fn stated(&mut self, key: &str, value: &str, why: &str) {
         let _ = writeln!(self.test, "    {key}: {value}  # NEEDED: {why}");
         self.needed.push(format!("{key} = {value}: {why}"));
+        self.assumed.push(key.to_owned());
     }
 
     /// States the unit of a column that is read in `wanted`; of one without a unit that cannot be right the `likely` one.
@@ -239,7 +261,7 @@ impl<'t> Text<'t> {
             "1.0",
             "how far it turned round beyond an end; figures do not depend on it",
         );
-        self.column(key("target_mm", "target_deg"), target);
+        self.read(key("target_mm", "target_deg"), target);
         self.unit(target, place, likely_target(target, place))?;
         if self.readings(taken)? {
             return Ok(());
@@ -272,11 +294,11 @@ impl<'t> Text<'t> {
         match (found.first(Role::Deviation), found.first(Role::Measured)) {
             (Some(read), _) => {
                 sign::check(found, read)?;
-                self.column(key("deviation_um", "deviation_arcsec"), read);
+                self.read(key("deviation_um", "deviation_arcsec"), read);
                 self.unit(read, deviation, likely_deviation(&[read], deviation))?;
             }
             (None, Some(read)) => {
-                self.column(key("measured_mm", "measured_deg"), read);
+                self.read(key("measured_mm", "measured_deg"), read);
                 let likely = likely_target(read, place);
                 self.unit(read, place, likely)?;
             }
@@ -286,6 +308,7 @@ impl<'t> Text<'t> {
     }
 
     fn passes(&mut self, passes: &[(&Known, Direction)], key: &str, wanted: Unit) -> Result<()> {
+        pass_names::check(self.found)?;
         let _ = writeln!(self.test, "    {key}:");
         let columns: Vec<&Known> = passes.iter().map(|(column, _)| *column).collect();
         let likely = likely_deviation(&columns, wanted);
@@ -294,11 +317,9 @@ impl<'t> Text<'t> {
                 Direction::Up => "up",
                 Direction::Down => "down",
             };
-            self.used.push(column.name.clone());
             let name = quoted(&column.name);
             let _ = writeln!(self.test, "      - {{column: {name}, direction: {word}}}");
-            self.recognised
-                .push(format!("pass {word}: column \"{}\"", column.name));
+            self.note(&format!("pass {word}"), column);
             self.unit(column, wanted, likely)?;
         }
         Ok(())
@@ -339,7 +360,7 @@ impl<'t> Text<'t> {
             Some(first_s) => self.start_s = first_s,
             None => self.time_unit(time)?,
         }
-        self.column("displacement_um", read);
+        self.read("displacement_um", read);
         self.unit(read, Unit::Um, likely_deviation(&[read], Unit::Um))?;
         if let Some(run) = found.first(Role::Run) {
             self.column("run", run);
@@ -354,9 +375,7 @@ impl<'t> Text<'t> {
                 continue;
             }
             let _ = writeln!(self.test, "      {id}: {}", quoted(&column.name));
-            self.used.push(column.name.clone());
-            self.recognised
-                .push(format!("temperature_degc.{id}: column \"{}\"", column.name));
+            self.note(&format!("temperature_degc.{id}"), column);
             self.unit(column, Unit::Degc, None)?;
             sensors.push(id);
         }
@@ -375,6 +394,9 @@ impl<'t> Text<'t> {
         }
         let first = time.numbers.first().copied().unwrap_or(0.0);
         let named = time.unit.filter(|unit| unit.kind() == Kind::Time);
+        if named.is_none() {
+            self.needed.extend(epochs::check(time, first)?);
+        }
         let of_epoch = || {
             let (word, _) = metrology::epoch::likely_unit(first)?;
             match word {
@@ -433,9 +455,7 @@ impl<'t> Text<'t> {
         match nominal {
             Some((column, radius_mm)) => {
                 let _ = writeln!(self.test, "    radius_mm: {radius_mm:?}");
-                self.recognised
-                    .push(format!("radius_mm: column \"{}\"", column.name));
-                self.used.push(column.name.clone());
+                self.note("radius_mm", column);
             }
             None => self.stated(
                 "radius_mm",
@@ -446,9 +466,7 @@ impl<'t> Text<'t> {
         match radial::feed(found) {
             Some((column, feed_mm_min)) => {
                 let _ = writeln!(self.test, "    feed_mm_min: {feed_mm_min:?}");
-                self.recognised
-                    .push(format!("feed_mm_min: column \"{}\"", column.name));
-                self.used.push(column.name.clone());
+                self.note("feed_mm_min", column);
             }
             None => self.stated(
                 "feed_mm_min",
@@ -457,9 +475,9 @@ impl<'t> Text<'t> {
             ),
         }
         self.column("run", run);
-        self.column("angle_deg", angle);
+        self.read("angle_deg", angle);
         self.unit(angle, Unit::Deg, None)?;
-        self.column("radial_um", read);
+        self.read("radial_um", read);
         self.unit(read, Unit::Um, likely_deviation(&[read], Unit::Um))?;
         Ok(())
     }
@@ -471,6 +489,7 @@ impl<'t> Text<'t> {
             let _ = writeln!(map, "start_s: {:.0}", self.start_s.floor());
         } else {
             map.push_str("start_s: 0  # NEEDED: when the measurement began, s since 1970\n");
+            self.assumed.push("start_s".to_owned());
             self.needed
                 .push("start_s: when the measurement began, s since 1970".to_owned());
         }
@@ -565,8 +584,12 @@ pub fn machine_for(map: &Map) -> String {
     text
 }
 
+#[cfg(test)]
+mod cells;
+mod epochs;
 mod likely;
 mod looked;
+mod nothing;
 mod radial;
 mod sign;
 #[cfg(test)]

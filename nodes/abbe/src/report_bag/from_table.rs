@@ -60,12 +60,12 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
         }
         return Ok(None);
     }
-    let (named, lines, read) = described(path, map)?;
+    let (described, read) = described(path, map)?;
     let machine = Named {
         place: "the machine that is taken where none is stated".to_owned(),
         text: propose::machine_for(&read),
     };
-    imported(path, (&named, lines), machine).map(Some)
+    imported(path, described, machine).map(Some)
 }
 
 /// The same for a machine file.
@@ -73,14 +73,17 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
 /// # Errors
 /// As [`of`], and where the machine could not have been measured so.
 pub fn of_machine(path: &Path, map: Option<&Path>, machine: Named) -> Result<FromTable> {
-    let (named, lines, _) = described(path, map)?;
-    imported(path, (&named, lines), machine)
+    let (described, _) = described(path, map)?;
+    imported(path, described, machine)
 }
 
-/// The map that is given, or the one that is proposed, with the lines of what it rests on.
-fn described(path: &Path, map: Option<&Path>) -> Result<(Named, Vec<String>, Map)> {
-    let (named, lines) = match map {
-        Some(map) => (Named::read(map, "map")?, vec![]),
+/// A map, its keys whose values are assumed, and the lines of what it rests on.
+type Described = (Named, Vec<String>, Vec<String>);
+
+/// The map that is given, or the one that is proposed.
+fn described(path: &Path, map: Option<&Path>) -> Result<(Described, Map)> {
+    let (named, assumed, lines) = match map {
+        Some(map) => (Named::read(map, "map")?, vec![], vec![]),
         None => proposed(path)?,
     };
     let place = &named.place;
@@ -90,17 +93,17 @@ fn described(path: &Path, map: Option<&Path>) -> Result<(Named, Vec<String>, Map
             yaml::placed(place, &named.text, &error.to_string())
         )
     })?;
-    Ok((named, lines, read))
+    Ok(((named, assumed, lines), read))
 }
 
 fn imported(
     path: &Path,
-    (named, mut lines): (&Named, Vec<String>),
+    (named, assumed, mut lines): Described,
     machine: Named,
 ) -> Result<FromTable> {
     let home = Vanishing::temporary().context("a folder for the bag of the table")?;
     let bag = home.path().join("bag");
-    let imported = import::import(path, named, machine, &bag)?;
+    let imported = import::import(path, (&named, &assumed), machine, &bag)?;
     lines.extend(imported.notes);
     lines.sort_by_key(|line| !line.starts_with(WARNING));
     Ok(FromTable {
@@ -111,8 +114,8 @@ fn imported(
     })
 }
 
-/// The map that is proposed for a table, with what it rests on.
-fn proposed(path: &Path) -> Result<(Named, Vec<String>)> {
+/// The map that is proposed for a table, its keys whose values are assumed, and what it rests on.
+fn proposed(path: &Path) -> Result<(Named, Vec<String>, Vec<String>)> {
     let proposal = propose::of(path).with_context(|| format!("table {}", path.display()))?;
     let mut lines: Vec<String> = proposal.recognised;
     // What was assumed of a column is not folded with what the table lacks.
@@ -125,5 +128,5 @@ fn proposed(path: &Path) -> Result<(Named, Vec<String>)> {
         place: "proposed for the table (abbe import --propose prints it)".to_owned(),
         text: proposal.map,
     };
-    Ok((named, lines))
+    Ok((named, proposal.assumed, lines))
 }

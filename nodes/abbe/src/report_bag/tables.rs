@@ -5,7 +5,8 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::import::Import;
-mod alone;
+mod conditions;
+mod instruments;
 mod odd;
 
 const REFERENCE: &str = include_str!("../../../../tests/validation/iso230_tables.json");
@@ -412,23 +413,63 @@ fn val_a_worksheet_as_reports_print_it_has_the_same_figures() {
     }
 }
 
+/// The page of a table alone: no map, no machine file.
+fn reported_alone(table: &Path) -> (Report, Vec<String>) {
+    let taken = from_table::of(table, None).unwrap().unwrap();
+    let tests = Tests {
+        machine: None,
+        ..Tests::of(&Bag::open(&taken.bag).unwrap())
+    };
+    let mut report = page("Tests", &tests, None).unwrap();
+    report.begin_with_table(&taken.lines);
+    (report, taken.lines.clone())
+}
+
 #[test]
-fn the_resolution_that_a_map_states_is_in_the_bag() {
-    let home = TempDir::new().unwrap();
-    let map = text_file::yaml(&root("tests/import/positioning.yaml")).unwrap();
-    let map = format!("resolution_um: 10.0\n{map}");
-    reported_by(
-        &home,
-        &root("tests/import/positioning.csv"),
-        &map,
-        "gap_first",
-        None,
+fn val_a_table_alone_has_the_figures_of_its_standard() {
+    for table in ["positioning.csv", "wide.xlsx"] {
+        let (report, lines) = reported_alone(&root(&format!("tests/import/{table}")));
+        let linear = found(&report, "iso230_2");
+        for (key, name) in [("accuracy", "a"), ("repeatability", "r"), ("reversal", "b")] {
+            near(
+                &linear[key]["value_mm"],
+                1e3,
+                reference("positioning", name),
+            );
+        }
+        let text = report.terminal();
+        assert!(
+            text.starts_with(&format!("Tests\n\n{}", lines[0])),
+            "{text}"
+        );
+        assert!(
+            lines
+                .iter()
+                .any(|line| line.starts_with("not in the table: axis")),
+            "{lines:?}"
+        );
+    }
+    let (report, lines) = reported_alone(&root("tests/import/drift.csv"));
+    let log = found(&report, "iso230_3_log");
+    near(
+        &log["figures"]["after_1_h"]["value_mm"],
+        1e3,
+        reference("drift", "after_1_h"),
     );
-    let bag = Bag::open(home.path().join("bag")).unwrap();
-    let stated = bag.attachment("params/import.yaml").unwrap().unwrap();
-    assert_eq!(
-        String::from_utf8(stated.data).unwrap(),
-        "resolution_um: 10.0\n"
+    assert!(lines.contains(&"axis Z".to_owned()), "{lines:?}");
+    let (report, _) = reported_alone(&root("tests/import/rotary.csv"));
+    let figures = &found(&report, "iso230_2_rotary")["figures"];
+    let arcsec = 648_000.0 / std::f64::consts::PI;
+    near(
+        &figures["both"]["accuracy"]["value_rad"],
+        arcsec,
+        reference("rotary", "a"),
+    );
+    let (report, _) = reported_alone(&root("tests/import/ballbar.csv"));
+    assert!(
+        report.terminal().contains("ISO 230-4"),
+        "{}",
+        report.terminal()
     );
 }
 
@@ -465,11 +506,8 @@ fn units_that_cannot_be_right_are_asked_about() {
 
 #[test]
 fn a_map_for_a_bag_is_refused_and_a_folder_is_a_bag() {
-    assert!(
-        from_table::of(Path::new("runs/a.bag"), None)
-            .unwrap()
-            .is_none()
-    );
+    let folder = from_table::of(Path::new("runs/a.bag"), None).unwrap();
+    assert!(folder.is_none());
     let Err(refused) = from_table::of(Path::new("bag"), Some(Path::new("map.yaml"))) else {
         panic!("taken");
     };
@@ -487,6 +525,8 @@ fn a_rotary_axis_without_a_reference_says_why_it_has_no_figures() {
         targets_rad: vec![],
         up_rad: vec![],
         down_rad: vec![],
+        mean_rad: 0.0,
+        outlying: Default::default(),
         left_out: vec![],
         longest_rest: Some(metrology::stamp::Span::from_nanos(2_000_000_000)),
         has_readings: false,

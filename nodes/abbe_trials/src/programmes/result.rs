@@ -6,14 +6,13 @@ use std::fmt::Write as _;
 use reports::section::{Rows, Section, head};
 use trials::Compared;
 use trials::proportion::{Proportion, median};
+use trials::target::{Ratio, TARGET_RATIO};
 
 use super::Judged;
 use crate::table;
 
 /// D from which an effect should be named in any case.
 const LARGE_D: f64 = 10.0;
-/// What a designed programme is to name, as a multiple of a shop's.
-const TARGET_RATIO: f64 = 1.5;
 
 /// One programme on every machine.
 struct Line {
@@ -119,29 +118,22 @@ impl Table {
                 self.minutes,
                 commits.join(", ")
             ),
-            self.ratio(),
+            ratio_words(self.ratio()),
         ]
     }
 
-    /// What the designed programme names, over what a shop's does.
-    fn ratio(&self) -> String {
-        let named = |programme: Compared| {
-            let line = self.lines.iter().find(|line| line.programme == programme);
-            line.map_or(0, |line| line.right.k)
-        };
-        let (designed, shop) = (named(Compared::Designed), named(Compared::Shop));
-        if shop == 0 {
-            return format!("The designed programme names {designed} effects, a shop's none.");
+    /// What the designed programme names beside what a shop's does.
+    pub(super) fn ratio(&self) -> Ratio {
+        let of = |programme: Compared| self.lines.iter().find(|line| line.programme == programme);
+        let named = |programme: Compared| of(programme).map_or(0, |line| line.right.k);
+        let machines = [Compared::Designed, Compared::Shop]
+            .map(|programme| of(programme).map_or(0, |line| line.machines));
+        Ratio {
+            machines: machines[0].min(machines[1]),
+            minutes: self.minutes,
+            designed: named(Compared::Designed),
+            shop: named(Compared::Shop),
         }
-        let ratio = designed as f64 / shop as f64;
-        let reached = if ratio >= TARGET_RATIO {
-            "reached"
-        } else {
-            "missed"
-        };
-        format!(
-            "The designed programme names {designed} effects, a shop's {shop}: {ratio:.2} times as many; the target of {TARGET_RATIO} is {reached}."
-        )
     }
 
     fn section(&self) -> Section {
@@ -162,6 +154,22 @@ impl Table {
         });
         section
     }
+}
+
+/// What the designed programme names, over what a shop's does.
+pub fn ratio_words(ratio: Ratio) -> String {
+    let Ratio { designed, shop, .. } = ratio;
+    let Some(value) = ratio.value() else {
+        return format!("The designed programme names {designed} effects, a shop's none.");
+    };
+    let reached = if value >= TARGET_RATIO {
+        "reached"
+    } else {
+        "missed"
+    };
+    format!(
+        "The designed programme names {designed} effects, a shop's {shop}: {value:.2} times as many; the target of {TARGET_RATIO} is {reached}."
+    )
 }
 
 const PROGRAMMES_TITLE: &str = "Programmes of the same minutes";

@@ -14,7 +14,7 @@ use trials::shop::{Line, ShopTally, Split};
 use trials::{Arm, Verdict};
 
 use super::ten_lines::ten_lines;
-use crate::table::{append_markdown, computer};
+use crate::table::{append_markdown, append_numbered, computer};
 
 const SHOP_TITLE: &str = "Blind trials on the sessions that shops have";
 /// Trials of an arm that the protocol wants.
@@ -91,10 +91,7 @@ impl Table {
 
     fn markdown(&self, lines: &[String], parts: &[Section]) -> String {
         let mut text = format!("# {SHOP_TITLE}\n\n");
-        for (number, line) in ten_lines(&self.arms).iter().enumerate() {
-            let _ = writeln!(text, "{}. {line}", number + 1);
-        }
-        text.push('\n');
+        append_numbered(&mut text, &ten_lines(&self.arms));
         for line in lines {
             let _ = writeln!(text, "{line}\n");
         }

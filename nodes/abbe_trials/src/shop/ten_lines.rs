@@ -4,6 +4,8 @@ use trials::Arm;
 use trials::proportion::Proportion;
 use trials::shop::{ShopTally, Split};
 
+use crate::table::{NOT_TRIED, percent};
+
 /// Ten sentences with the figures of the arms; what was not tried says so.
 pub fn ten_lines(arms: &[ShopTally]) -> Vec<String> {
     let of = |arm: Arm| arms.iter().find(|tally| tally.arm == arm);
@@ -68,15 +70,6 @@ pub fn ten_lines(arms: &[ShopTally]) -> Vec<String> {
 
 /// Title of the split by noise.
 const MEMORY: &str = "noise that neighbouring readings share";
-const NOT_TRIED: &str = "not tried";
-
-fn percent(count: Proportion) -> String {
-    let share = count.share();
-    share.map_or_else(
-        || NOT_TRIED.to_owned(),
-        |share| format!("{:.0} %", 100.0 * share),
-    )
-}
 
 fn share(tally: Option<&ShopTally>, what: &str) -> String {
     let line = tally.and_then(|tally| tally.line(what));

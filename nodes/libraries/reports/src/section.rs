@@ -6,6 +6,7 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Wi
 use maud::{Markup, html};
 use metrology::number::decimals_of;
 
+use super::minus::with_minus_signs;
 use super::page;
 use super::screen::Tile;
 use super::svg::unsigned_zero;
@@ -117,6 +118,13 @@ impl Section {
         }
     }
 
+    /// A line for every reading that is far from the others and counts.
+    pub fn name_far(&mut self, far: &[String]) {
+        for line in far {
+            self.warn("Far from the others", format!("{}.", capitalised(line)));
+        }
+    }
+
     /// For a terminal.
     #[must_use]
     pub fn terminal(&self) -> String {
@@ -134,7 +142,7 @@ impl Section {
                 text.push('\n');
             }
         }
-        text
+        with_minus_signs(&text).into_owned()
     }
 
     /// For a page: folded, its pictures first; tables stand behind a picture where there is one.

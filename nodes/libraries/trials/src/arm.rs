@@ -40,11 +40,17 @@ pub enum Arm {
     ShopBallbar,
     /// Logs of a shop's displacement sensor and thermometers.
     ShopLogs,
+    /// 0 to 3 effects, every second machine with forms that are not quite the catalogue's, measured by a designed programme.
+    Designed,
+    /// The same with one effect, whose class the diagnosis is told to leave out.
+    DesignedLeftOut,
+    /// One effect that has a double or is small; a designed second round follows the designed programme.
+    DesignedTwoRounds,
 }
 
 impl Arm {
     /// Every arm, in order.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 17] = [
         Self::Catalogue,
         Self::LeftOut,
         Self::Foreign,
@@ -59,6 +65,9 @@ impl Arm {
         Self::ShopPositioning,
         Self::ShopBallbar,
         Self::ShopLogs,
+        Self::Designed,
+        Self::DesignedLeftOut,
+        Self::DesignedTwoRounds,
     ];
 
     /// Its number in the protocol; the others go by their names.
@@ -79,6 +88,9 @@ impl Arm {
             "s1",
             "s2",
             "s3",
+            "s5",
+            "s6",
+            "s7",
         ][self as usize]
     }
 
@@ -100,13 +112,28 @@ impl Arm {
             "a shop's ISO 230-2 run",
             "a shop's ballbar",
             "a shop's logs of displacement and temperatures",
+            "a designed programme",
+            "a designed programme, a class left out",
+            "a designed programme and a designed second round",
         ][self as usize]
     }
 
     /// Whether the diagnosis is told to leave out the class that is hidden.
     #[must_use]
     pub const fn leaves_out(self) -> bool {
-        matches!(self, Self::LeftOut | Self::OwnLeftOut)
+        matches!(
+            self,
+            Self::LeftOut | Self::OwnLeftOut | Self::DesignedLeftOut
+        )
+    }
+
+    /// Whether its machines are measured by designed programmes.
+    #[must_use]
+    pub const fn is_designed(self) -> bool {
+        matches!(
+            self,
+            Self::Designed | Self::DesignedLeftOut | Self::DesignedTwoRounds
+        )
     }
 
     /// Whether its sessions are tables as shops have them.

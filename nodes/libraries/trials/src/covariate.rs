@@ -77,6 +77,7 @@ mod tests {
             is_foreign: false,
             besides: vec![],
             d: 10.0,
+            common_d: None,
         };
         let play = effect(Class::Backlash, "Y");
         assert!(is_right(&play, "sense*log_distance_since_reversal_y"));

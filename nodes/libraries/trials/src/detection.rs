@@ -104,6 +104,32 @@ impl fmt::Display for Limit {
     }
 }
 
+/// D beyond which an effect should be found in any case.
+pub const MIN_D_TO_FIND: f64 = 20.0;
+/// Edge between the two lower bins of [`by_d`].
+const MIDDLE_D: f64 = 10.0;
+
+/// How often effects were found: below D 10, from 10 to 20, and above.
+#[must_use]
+pub fn by_d(all: &[(f64, bool)]) -> [Proportion; 3] {
+    [
+        [0.0, MIDDLE_D],
+        [MIDDLE_D, MIN_D_TO_FIND],
+        [MIN_D_TO_FIND, f64::INFINITY],
+    ]
+    .map(|[low, high]| {
+        let own = all.iter().filter(|(d, _)| *d > low && *d <= high);
+        Proportion::of(own.map(|(_, is_found)| *is_found))
+    })
+}
+
+/// The size that has D 20 in the middle of effects of a size and a D.
+#[must_use]
+pub fn size_to_find(all: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
+    let sizes = all.map(|(size, d)| size.abs() * MIN_D_TO_FIND / d.max(1e-9));
+    median(sizes.collect())
+}
+
 /// (2) of trials: D, and whether it was named; none without trials.
 #[must_use]
 pub fn d95(trials: &[(f64, bool)]) -> Option<Limit> {

@@ -24,8 +24,8 @@ pub enum TrialError {
         #[from]
         source: MachineFileError,
     },
-    /// The machine file cannot be written as text.
-    #[error("drawn machine: {source}")]
+    /// The machine file or the plan cannot be written as text.
+    #[error("drawn machine or its plan: {source}")]
     Text {
         /// Why.
         #[from]

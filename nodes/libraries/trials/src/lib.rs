@@ -9,6 +9,8 @@
 //! them, `covariate` knows what a leftover should go with, `target` says which figures are as good as they should be;
 //! `compared` has the programmes that a designed one is compared with; `comparison` puts the methods of `baseline` and diagnoses without one of their rules before the same judge.
 //!
+//! `designed` has machines that are measured by a programme that another program designs for their file.
+//!
 //! `shop` has generator, judge and table of the sessions that shops bring, in files of its own.
 //!
 //! `size` says how large a hidden effect is for these measurements: D, the root of its chi-square against the
@@ -22,6 +24,7 @@ pub mod compared;
 pub mod comparison;
 pub mod confusion;
 pub mod covariate;
+pub mod designed;
 pub mod detection;
 pub mod effect;
 pub mod error;
@@ -46,7 +49,7 @@ pub use baseline::Method;
 pub use compared::Compared;
 pub use effect::Class;
 pub use error::TrialError;
-pub use measurement::{Sample, measure};
+pub use measurement::{Sample, measure, timed};
 pub use rig::Rig;
 pub use tally::Tally;
 pub use trial::Trial;

@@ -104,6 +104,21 @@ pub fn measure(rig: &Rig, take: &mut dyn FnMut(Stamp<Host>, Sample)) -> Result<(
     session.ended.unwrap_or(Ok(()))
 }
 
+/// The same, with the time that it took on the machine, min.
+///
+/// # Errors
+/// As [`measure`].
+pub fn timed(rig: &Rig, take: &mut dyn FnMut(Stamp<Host>, Sample)) -> Result<f64, TrialError> {
+    let mut last_nanos = 0;
+    let mut first_nanos = None;
+    measure(rig, &mut |at, sample| {
+        let _ = first_nanos.get_or_insert(at.nanos());
+        last_nanos = last_nanos.max(at.nanos());
+        take(at, sample);
+    })?;
+    Ok((last_nanos - first_nanos.unwrap_or(last_nanos)) as f64 * 1e-9 / 60.0)
+}
+
 impl Session<'_> {
     fn ask(&mut self, input: ToSequencer) -> Result<(), TrialError> {
         let mut said = std::mem::take(&mut self.said);

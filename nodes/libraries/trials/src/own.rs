@@ -40,7 +40,7 @@ use sequencer::{Plan, Step};
 use crate::effect::{Class, Hidden};
 use crate::error::TrialError;
 use crate::rig::Rig;
-use crate::size::TOUCH_VARIANCE_MM2;
+use crate::size::touch_mm2;
 
 const FIVE_AXIS: [&str; 2] = [
     include_str!("../../../../launch_configs/five_axis/machine.yaml"),
@@ -111,7 +111,7 @@ pub(crate) fn jitter_d(jitter_ms: f64) -> f64 {
     let (feeds_mm_min, repeats, times) = TOUCHES;
     let each = f64::from(repeats) * 2.0 * times as f64;
     let square = |feed_mm_min: f64| {
-        let ratio = 1.0 + (feed_mm_min / 60.0 * jitter_ms * 1e-3).powi(2) / TOUCH_VARIANCE_MM2;
+        let ratio = 1.0 + (feed_mm_min / 60.0 * jitter_ms * 1e-3).powi(2) / touch_mm2(1.0);
         each * (ratio - 1.0 - ratio.ln())
     };
     feeds_mm_min.map(square).iter().sum::<f64>().sqrt()

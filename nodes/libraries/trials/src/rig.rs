@@ -163,6 +163,14 @@ impl Rig {
         Ok(serde_saphyr::to_string(&self.machine)?)
     }
 
+    /// The plan as text.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn plan_text(&self) -> Result<String, TrialError> {
+        Ok(serde_saphyr::to_string(&self.plan)?)
+    }
+
     /// The control's own entry of a linear axis.
     pub(crate) fn control_of(&mut self, axis: Axis) -> Option<&mut LinearAxisEntry> {
         linear(&mut self.control, axis)

@@ -19,6 +19,7 @@ pub fn effect(class: Class, axis: &str, d: f64) -> TrueEffect {
         is_foreign: false,
         besides: vec![],
         d,
+        common_d: None,
     }
 }
 
@@ -49,6 +50,7 @@ pub fn verdict(effects: Vec<TrueEffect>, causes: Vec<SaidCause>, is_unknown: boo
             has_motors: true,
             bare_um: Some(0.28),
             shop: None,
+            designed: None,
             measure: crate::truth::MEASURE,
         },
         truth_sha256: String::new(),

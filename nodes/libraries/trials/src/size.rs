@@ -24,9 +24,7 @@
 //! ```
 //!
 //! A touch has f for its feature and feed instead, and where an axis stands all readings are one row: they have one error of
-//! form, however long it stands. Only that is counted which the test is made of: a circle while the
-//! command is on it at its feed, a position once the axis has stood for [`SETTLES_S`]. While an axis runs in, an effect of
-//! the drive may be ten times what it is on the circle, and no evaluation looks there.
+//! form, however long it stands. Only that is counted which the test is made of (`counted`).
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
@@ -42,17 +40,19 @@
 
 use std::collections::BTreeMap;
 
+use metrology::Axis;
 use metrology::sample::{ProbeTrigger, TestKind, TestSegment};
 use metrology::stamp::{Host, Stamp};
-use metrology::{Axis, PerAxis};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::measurement::{Sample, plane_axes};
 use crate::proportion::median;
 use crate::scatter::Scatter;
 
+use counted::Counted;
 use waves::Waves;
 
+mod counted;
 mod waves;
 
 /// Rows that a run's readings are thinned to.
@@ -65,16 +65,6 @@ const TOUCH_MM: f64 = 3e-4;
 const FORM_MM: f64 = 2e-4;
 /// Part of it that is rough.
 const ROUGH: f64 = 0.5;
-/// Least time between two states, s.
-const LEAST_PERIOD_S: f64 = 1e-4;
-/// An axis that moved by less than this since the reading before stands, mm.
-const STANDS_MM: f64 = 1e-6;
-/// How long it stands before its position counts, s.
-const SETTLES_S: f64 = 0.3;
-/// The command is on the circle when it is this close to it, mm.
-const ON_CIRCLE_MM: f64 = 2e-3;
-/// Share of the feed below which it is still running in.
-const AT_FEED: f64 = 0.98;
 
 /// A reading less its command, with what it was made by.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,6 +95,8 @@ struct Block {
     floats: Floats,
     readings: Vec<Reading>,
     is_touch: bool,
+    /// Whether it is of touches at several feeds, each with an error of form.
+    has_feeds: bool,
     condition: Condition,
     set_up: SetUp,
 }
@@ -119,36 +111,20 @@ type Key = (u32, String);
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Deviations {
     blocks: BTreeMap<Key, Block>,
-    segment: Option<TestSegment>,
-    commanded: PerAxis<f64>,
-    commanded_at: Stamp<Host>,
-    velocity_mm_s: Vector3<f64>,
-    stands_since: Option<Stamp<Host>>,
+    counted: Counted,
 }
 
 impl Deviations {
     /// Takes a sample of the session.
     pub(crate) fn take(&mut self, at: Stamp<Host>, sample: &Sample) {
         match sample {
-            Sample::State(state) => {
-                let way = (state.commanded.xyz() - self.commanded.xyz()).norm();
-                self.stands_since =
-                    (way < STANDS_MM).then(|| self.stands_since.unwrap_or(state.received_at));
-                let since_s = (state.received_at - self.commanded_at).as_secs_f64();
-                let moved = state.commanded.xyz() - self.commanded.xyz();
-                self.velocity_mm_s = moved / since_s.max(LEAST_PERIOD_S);
-                self.commanded_at = state.received_at;
-                self.commanded = state.commanded;
-            }
-            Sample::Segment(segment) => {
-                let is_test = segment.begin && segment.kind != TestKind::Production;
-                self.segment = is_test.then(|| segment.clone());
-            }
-            Sample::Grid(sample) if self.is_on_circle() => {
+            Sample::State(state) => self.counted.stand(state),
+            Sample::Segment(segment) => self.counted.begin(segment),
+            Sample::Grid(sample) if self.counted.has_grid(at) => {
                 let axes = plane_axes(sample.plane);
                 // A reading is compared with the command at its stamp, which may be late.
                 let late_s = (sample.at - at).as_secs_f64();
-                let here_mm = self.commanded.xyz() + self.velocity_mm_s * late_s;
+                let here_mm = self.counted.commanded_mm() + self.counted.velocity_mm_s() * late_s;
                 let readings = [sample.u_mm, sample.v_mm].into_iter().zip(axes);
                 for (read_mm, direction) in readings {
                     self.push(
@@ -159,13 +135,13 @@ impl Deviations {
                             deviation_mm: read_mm - here_mm[direction],
                             direction,
                             place_mm: here_mm,
-                            stands_since: self.stands_since,
+                            stands_since: self.counted.stands_since(),
                         },
                     );
                 }
             }
-            Sample::Length(sample) if self.has_settled(at) => {
-                let here_mm = self.commanded.xyz();
+            Sample::Length(sample) if self.counted.has_length(at) => {
+                let here_mm = self.counted.commanded_mm();
                 let direction = sample.axis.index();
                 self.push(
                     sample.axis.letter(),
@@ -175,33 +151,13 @@ impl Deviations {
                         deviation_mm: sample.displacement_mm - here_mm[direction],
                         direction,
                         place_mm: here_mm,
-                        stands_since: self.stands_since,
+                        stands_since: self.counted.stands_since(),
                     },
                 );
             }
             Sample::Trigger(trigger) => self.touch(trigger),
             Sample::Grid(_) | Sample::Length(_) | Sample::Temperature(_) => {}
         }
-    }
-
-    fn has_settled(&self, at: Stamp<Host>) -> bool {
-        self.stands_since
-            .is_some_and(|since| (at - since).as_secs_f64() >= SETTLES_S)
-    }
-
-    /// Whether the command is on the circle of the test at its feed; every other test counts throughout.
-    fn is_on_circle(&self) -> bool {
-        let Some(segment) = &self.segment else {
-            return false;
-        };
-        if segment.kind != TestKind::Circle {
-            return true;
-        }
-        let [u, v] = plane_axes(segment.plane);
-        let from_centre = self.commanded.xyz() - segment.centre_mm;
-        let off_mm = from_centre[u].hypot(from_centre[v]) - segment.radius_mm;
-        let speed_mm_s = self.velocity_mm_s[u].hypot(self.velocity_mm_s[v]);
-        off_mm.abs() <= ON_CIRCLE_MM && speed_mm_s >= AT_FEED * segment.feed_mm_s
     }
 
     /// A touch: where the axes were latched, along the approach.
@@ -221,7 +177,7 @@ impl Deviations {
     }
 
     fn push(&mut self, what: &str, floats: Floats, is_touch: bool, reading: Reading) {
-        let Some(segment) = &self.segment else {
+        let Some(segment) = self.counted.segment() else {
             return;
         };
         let block = self
@@ -231,6 +187,7 @@ impl Deviations {
                 floats,
                 readings: vec![],
                 is_touch,
+                has_feeds: segment.kind == TestKind::Latency,
                 condition: condition(segment, what),
                 set_up: format!(
                     "{} {} {:?} {what}",
@@ -332,7 +289,7 @@ fn gain(
     // Of each row: everything, and what of it is chatter.
     let variances_mm2 = rows.mean_of.map(|readings| {
         if with.is_touch {
-            return (TOUCH_VARIANCE_MM2, 0.0);
+            return (touch_mm2(if with.has_feeds { repeats } else { 1.0 }), 0.0);
         }
         let chatter_mm2 = rows.chatter_mm2 / readings;
         let reading_mm2 =
@@ -361,8 +318,10 @@ fn of_mean_mm2(white_mm: f64, ar: f64, readings: f64) -> f64 {
 
 /// Touches of one face at one feed in a run (`programme`).
 const TOUCHES_ALIKE: f64 = 2.0;
-/// Variance of a touch, mm².
-pub(crate) const TOUCH_VARIANCE_MM2: f64 = TOUCH_MM * TOUCH_MM + TOUCHES_ALIKE * FORM_MM * FORM_MM;
+/// Variance of a touch of which a run is repeated so often, mm².
+pub(crate) fn touch_mm2(repeats: f64) -> f64 {
+    TOUCH_MM * TOUCH_MM + repeats * TOUCHES_ALIKE * FORM_MM * FORM_MM
+}
 /// Middle square of a normal number of variance 1.
 const MIDDLE_SQUARE: f64 = 0.454_936;
 

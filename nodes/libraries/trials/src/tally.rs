@@ -110,9 +110,10 @@ impl Tally {
     }
 }
 
-/// Area under the curve of the unknown score: trials with a class left out against trials with known classes only.
+/// Area under the curve of the unknown score: trials of an arm with a class left out against those of one with known classes
+/// only.
 #[must_use]
-pub fn unknown_auroc(verdicts: &[Verdict], least_d: f64) -> Figure {
+pub fn unknown_auroc(verdicts: &[Verdict], [left_out, known]: [Arm; 2], least_d: f64) -> Figure {
     let scores = |arm: Arm| -> Vec<f64> {
         let own = verdicts
             .iter()
@@ -120,7 +121,7 @@ pub fn unknown_auroc(verdicts: &[Verdict], least_d: f64) -> Figure {
         own.filter_map(|v| Some(v.said.as_ref()?.unknown_ratio))
             .collect()
     };
-    let (positive, negative) = (scores(Arm::LeftOut), scores(Arm::Catalogue));
+    let (positive, negative) = (scores(left_out), scores(known));
     Figure::new(
         &format!("AUROC of unknown, D > {least_d}"),
         auroc(&positive, &negative),
@@ -175,6 +176,20 @@ pub(crate) fn has_wrong(verdict: &Verdict) -> bool {
     verdict.wrong().next().is_some()
 }
 
+/// Those that hide so many effects.
+fn hiding<'v>(all: &[&'v Verdict], least: usize, most: usize) -> Vec<&'v Verdict> {
+    let fits = |v: &&&Verdict| (least..=most).contains(&v.truth.effects.len());
+    all.iter().filter(fits).copied().collect()
+}
+
+/// Those with one effect that should be named, and those with several.
+pub(crate) fn to_be_named<'v>(all: &[&'v Verdict]) -> [Vec<&'v Verdict>; 2] {
+    [
+        beyond(&hiding(all, 1, 1), SINGLE_D),
+        beyond(&hiding(all, 2, usize::MAX), SEVERAL_D),
+    ]
+}
+
 /// Those of which everything that is hidden is larger than `d`.
 pub(crate) fn beyond<'v>(all: &[&'v Verdict], d: f64) -> Vec<&'v Verdict> {
     let is_large = |v: &&&Verdict| v.least_d().is_some_and(|least| least > d);
@@ -199,22 +214,17 @@ impl Rates {
 
     /// Whole sets, by how many effects are hidden.
     fn of_sets(&mut self, said: &[&Verdict]) {
-        let with = |least: usize, most: usize| -> Vec<&Verdict> {
-            let fits = |v: &&&Verdict| (least..=most).contains(&v.truth.effects.len());
-            said.iter().filter(fits).copied().collect()
-        };
         self.add(
             "nothing hidden: nothing named",
-            &with(0, 0),
+            &hiding(said, 0, 0),
             Verdict::is_exact,
         );
-        let single = beyond(&with(1, 1), SINGLE_D);
+        let [single, several] = to_be_named(said);
         self.add(
             &format!("1 effect, D > {SINGLE_D}: exact"),
             &single,
             Verdict::is_exact,
         );
-        let several = beyond(&with(2, usize::MAX), SEVERAL_D);
         let what = format!("2-3 effects, each D > {SEVERAL_D}: exact");
         self.add(&what, &several, Verdict::is_exact);
         let large = beyond(said, MIN_D_OF_FOREIGN);

@@ -10,12 +10,17 @@ use crate::arm::Arm;
 use crate::calibration::calibration;
 use crate::confusion::ISOLABLE;
 use crate::covariate;
+use crate::designed::by_round;
 use crate::detection::{Limit, d95};
 use crate::effect::Class;
 use crate::proportion::{Proportion, auroc, median};
-use crate::tally::{MIN_D_OF_FOREIGN, SEVERAL_D, SINGLE_D, beyond, has_wrong, is_reproduced};
+use crate::tally::{MIN_D_OF_FOREIGN, SINGLE_D, beyond, has_wrong, is_reproduced, to_be_named};
 use crate::truth::TrueEffect;
-use crate::verdict::Verdict;
+use crate::verdict::{Second, Verdict};
+
+pub use designed::{Ratio, TARGET_RATIO, of_designed};
+
+mod designed;
 
 /// One line of the protocol's table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,7 +82,8 @@ impl Bound {
     fn words(self, as_percent: bool) -> String {
         let number = |value: f64| {
             if as_percent {
-                format!("{:.0} %", 100.0 * value)
+                let percent = (1e3 * value).round() / 10.0;
+                format!("{percent} %")
             } else {
                 format!("{value}")
             }
@@ -239,23 +245,25 @@ fn of_limits(sheet: &mut Sheet, small: &[&Verdict], known: &[&Verdict]) {
     sheet.limit(&metric("worst class"), 10.0, largest, n);
 }
 
-fn of_known(sheet: &mut Sheet, known: &[&Verdict]) {
-    let with = |least: usize, most: usize| -> Vec<&Verdict> {
-        let fits = |v: &&&Verdict| (least..=most).contains(&v.truth.effects.len());
-        known.iter().filter(fits).copied().collect()
-    };
-    let single = beyond(&with(1, 1), SINGLE_D);
+/// Machines with one large effect, and those with several: whether nothing but them is named, and all of them. Those with
+/// several.
+fn of_sets_of<'v>(sheet: &mut Sheet, arm: &str, known: &[&'v Verdict]) -> Vec<&'v Verdict> {
+    let [single, several] = to_be_named(known);
     sheet.share(
-        "i: 1 effect, D > 10, exact",
+        &format!("{arm}: 1 effect, D > 10, exact"),
         AtLeast(0.98),
         single.iter().map(|v| v.is_exact()),
     );
-    let several = beyond(&with(2, usize::MAX), SEVERAL_D);
     sheet.share(
-        "i: 2 or 3 effects, each D > 7, exact set",
+        &format!("{arm}: 2 or 3 effects, each D > 7, exact set"),
         AtLeast(0.9),
         several.iter().map(|v| v.is_exact()),
     );
+    several
+}
+
+fn of_known(sheet: &mut Sheet, known: &[&Verdict]) {
+    let several = of_sets_of(sheet, "i", known);
     let each = pairs(&several).map(|(v, e)| v.has(e));
     sheet.share(
         "i: each of 2 or 3 effects, D > 7, named",
@@ -281,36 +289,42 @@ fn of_foreign(sheet: &mut Sheet, foreign: &[&Verdict]) {
     sheet.share("iii: wrong cause named, unflagged", AtMost(0.08), wrong);
 }
 
-fn of_left_out(sheet: &mut Sheet, left_out: &[&Verdict], known: &[&Verdict]) {
+/// AUROC of the unknown score of machines whose class is left out beside others, D > 10, and of how many.
+fn area(left_out: &[&Verdict], known: &[&Verdict]) -> (Option<f64>, usize) {
     let score = |v: &&Verdict| v.said.as_ref().map(|said| said.unknown_ratio);
     let large =
         |all: &[&Verdict]| -> Vec<f64> { beyond(all, SINGLE_D).iter().filter_map(score).collect() };
-    let area = |own: &[&Verdict]| {
-        let (positive, negative) = (large(own), large(known));
-        (auroc(&positive, &negative), positive.len() + negative.len())
-    };
-    let (value, n) = area(left_out);
-    sheet.figure("ii: AUROC of unknown, D > 10", AtLeast(0.95), value, n);
-    let isolable = |v: &&&Verdict| v.likeness.iter().any(|one| one.sin_alone >= ISOLABLE);
-    let (value, n) = area(
-        &left_out
-            .iter()
-            .filter(isolable)
-            .copied()
-            .collect::<Vec<_>>(),
-    );
-    sheet.figure("ii: the same, isolable classes", AtLeast(0.985), value, n);
+    let (positive, negative) = (large(left_out), large(known));
+    (auroc(&positive, &negative), positive.len() + negative.len())
+}
+
+/// Those of whose effects other classes cannot imitate half.
+fn isolable<'v>(left_out: &[&'v Verdict]) -> Vec<&'v Verdict> {
+    let is_isolable = |v: &&&Verdict| v.likeness.iter().any(|one| one.sin_alone >= ISOLABLE);
+    left_out.iter().filter(is_isolable).copied().collect()
+}
+
+/// Wrong names where a class with a D above 20 is left out, and those that are not flagged.
+fn of_wrong_names(sheet: &mut Sheet, arm: &str, left_out: &[&Verdict], most: f64) {
     let large = beyond(left_out, MIN_D_OF_FOREIGN);
     sheet.share(
-        "ii: wrong cause named, D > 20",
-        AtMost(0.2),
+        &format!("{arm}: wrong cause named, D > 20"),
+        AtMost(most),
         large.iter().map(|v| has_wrong(v)),
     );
     sheet.share(
-        "ii: the same, and not flagged unknown",
+        &format!("{arm}: the same, and not flagged unknown"),
         AtMost(0.05),
         large.iter().map(|v| has_wrong(v) && !v.is_flagged()),
     );
+}
+
+fn of_left_out(sheet: &mut Sheet, left_out: &[&Verdict], known: &[&Verdict]) {
+    let (value, n) = area(left_out, known);
+    sheet.figure("ii: AUROC of unknown, D > 10", AtLeast(0.95), value, n);
+    let (value, n) = area(&isolable(left_out), known);
+    sheet.figure("ii: the same, isolable classes", AtLeast(0.985), value, n);
+    of_wrong_names(sheet, "ii", left_out, 0.2);
     let described = left_out.iter().filter(|v| v.is_flagged()).filter_map(|v| {
         let covariate = &v.said.as_ref()?.covariate;
         let effect = v.truth.effects.first()?;
@@ -361,14 +375,27 @@ fn on_truth(verdict: &Verdict, effect: &TrueEffect) -> Option<f64> {
     detected.then(|| own.map_or(0.0, |cause| cause.confidence))
 }
 
+/// Relative errors of parameters times D, and whether their intervals hold them; D > 20.
+fn sized(known: &[&Verdict]) -> Vec<(f64, bool)> {
+    let large = pairs(known).filter(|(_, e)| e.d > MIN_D_OF_FOREIGN);
+    let sized = large.filter_map(|(v, e)| {
+        v.sized(e)
+            .map(|(error, covered)| (error.abs() * e.d, covered))
+    });
+    sized.collect()
+}
+
+/// Whether intervals of the gap closed hold what is closed on later runs.
+fn later_held<'v>(own: impl Iterator<Item = &'v &'v Verdict>) -> impl Iterator<Item = bool> {
+    own.filter_map(|v| {
+        let [_, low, high] = v.said.as_ref()?.closed?;
+        let best = v.later_closed?;
+        Some((low..=high).contains(&best))
+    })
+}
+
 fn of_sizes(sheet: &mut Sheet, known: &[&Verdict]) {
-    let sized: Vec<(f64, bool)> = pairs(known)
-        .filter(|(_, e)| e.d > MIN_D_OF_FOREIGN)
-        .filter_map(|(v, e)| {
-            v.sized(e)
-                .map(|(error, covered)| (error.abs() * e.d, covered))
-        })
-        .collect();
+    let sized = sized(known);
     sheet.middle(
         "i: relative error of a parameter times D, median, D > 20",
         AtMost(2.0),
@@ -398,37 +425,34 @@ fn of_shrink(sheet: &mut Sheet, known: &[&Verdict], foreign: &[&Verdict]) {
             of(&Verdict::left_of_gap),
         );
     }
-    let told = known.iter().chain(foreign).filter_map(|v| {
-        let [_, low, high] = v.said.as_ref()?.closed?;
-        let best = v.later_closed?;
-        Some((low..=high).contains(&best))
-    });
     sheet.share(
         "i, iii: intervals of the gap closed that hold it on later runs",
         Within(0.9, 0.98),
-        told,
+        later_held(known.iter().chain(foreign)),
     );
 }
 
 /// Squared distance from which a run was to decide.
 const DECIDES: f64 = 9.0;
 
+/// Of machines that were open after one round: whether they are exact after a second one of some kind.
+fn opened(own: &[&Verdict], counts: fn(&Second) -> bool) -> Vec<bool> {
+    let all = own.iter().filter_map(|v| {
+        let second = v.second.as_ref().filter(|second| counts(second))?;
+        let [before, after] = by_round(v, second);
+        (!before).then_some(after)
+    });
+    all.collect()
+}
+
 fn of_two_rounds(sheet: &mut Sheet, own: &[&Verdict]) {
-    let asked = own.iter().filter_map(|v| {
-        let second = v.second.as_ref().filter(|second| second.delta >= DECIDES)?;
-        let said = second.said.clone()?;
-        (!v.is_exact()).then(|| {
-            let after = Verdict {
-                said: Some(said),
-                ..(*v).clone()
-            };
-            after.is_exact()
-        })
+    let asked = opened(own, |second| {
+        second.delta >= DECIDES && second.said.is_some()
     });
     sheet.share(
         "vii: open after one round, exact after the run asked for (Δ ≥ 9)",
         AtLeast(0.85),
-        asked,
+        asked.into_iter(),
     );
 }
 
@@ -532,5 +556,6 @@ mod tests {
         assert!(AtMost(2.0).holds(2.0) && !AtMost(2.0).holds(2.1));
         assert!(Within(0.9, 0.98).holds(0.95) && !Within(0.9, 0.98).holds(0.99));
         assert_eq!(Within(0.92, 0.97).words(true), "92 % to 97 %");
+        assert_eq!(AtMost(0.005).words(true), "≤ 0.5 %");
     }
 }

@@ -12,9 +12,10 @@ use sequencer::Step;
 
 use crate::arm::Arm;
 use crate::commissioning::Commissioning;
+use crate::designed;
 use crate::effect::{Class, Hidden};
 use crate::error::TrialError;
-use crate::measurement::measure;
+use crate::measurement::{measure, timed};
 use crate::own;
 use crate::rig::{Rig, STATE_RATE_HZ};
 use crate::shop::dice::{how_many, log_uniform};
@@ -39,6 +40,8 @@ pub struct Trial {
     pub bare: Rig,
     /// What is to be found.
     pub truth: Truth,
+    /// What is hidden, in the order of the truth.
+    pub(crate) hidden: Vec<Hidden>,
 }
 
 impl Trial {
@@ -48,17 +51,19 @@ impl Trial {
     /// When what is drawn breaks a rule, or cannot be measured.
     pub fn draw(arm: Arm, seed: u64, index: u64) -> Result<Self, TrialError> {
         let mut random = stream(arm, seed, index);
-        let mut rig = Rig::draw(&mut random, arm == Arm::HeavyNull)?;
+        let mut shared = designed::machines(arm, seed, index);
+        let of_machine = shared.as_mut().unwrap_or(&mut random);
+        let mut rig = Rig::draw(of_machine, arm == Arm::HeavyNull)?;
         let wanted = wanted(&mut random, arm, index);
-        if arm == Arm::Foreign {
-            rig.shake(&mut random);
+        if is_foreign(arm, index) {
+            rig.shake(shared.as_mut().unwrap_or(&mut random));
         }
         let own = wanted.first().filter(|_| has_own_programmes(arm));
         if let Some((hidden, _)) = own {
             own::prepare(&mut random, hidden, &mut rig)?;
         }
         let bare = match own {
-            Some((hidden, _)) if !own::is_common(hidden.class) => deviations(&rig)?,
+            Some((hidden, _)) if !own::is_common(hidden.class) => deviations(&rig)?.0,
             _ => commissioned(&mut rig)?,
         };
         let wanted = if hides_nothing(arm, index) {
@@ -68,21 +73,30 @@ impl Trial {
         };
         let mut effects = Vec::new();
         for (hidden, d) in wanted {
-            let (sized, true_d) = scaled(&rig, &bare, hidden, d, arm)?;
+            let (sized, true_d) = scaled(&rig, &bare, hidden, d, (arm, index))?;
             effects.push((sized, true_d));
         }
+        Self::hiding((arm, seed, index), rig, &effects)
+    }
+
+    /// A machine that hides effects of these D.
+    fn hiding(
+        (arm, seed, index): (Arm, u64, u64),
+        mut rig: Rig,
+        effects: &[(Hidden, f64)],
+    ) -> Result<Self, TrialError> {
         let unspoilt = rig.clone();
-        for (hidden, _) in &effects {
+        for (hidden, _) in effects {
             hidden.hide(&mut rig)?;
         }
         let left_out = effects.first().filter(|_| arm.leaves_out());
+        let known = effects.iter();
         let truth = Truth {
             arm,
             index,
             seed,
             left_out: left_out.map(|(hidden, _)| hidden.class.id().to_owned()),
-            effects: effects
-                .iter()
+            effects: known
                 .map(|(hidden, d)| TrueEffect::of(hidden, *d))
                 .collect(),
             between_runs_um: rig.scatter.between_runs_mm * 1e3,
@@ -92,11 +106,13 @@ impl Trial {
             bare_um: None,
             measure: MEASURE,
             shop: None,
+            designed: None,
         };
         Ok(Self {
             rig,
             bare: unspoilt,
             truth,
+            hidden: effects.iter().map(|(hidden, _)| *hidden).collect(),
         })
     }
 }
@@ -117,21 +133,22 @@ pub(crate) fn stream(arm: Arm, seed: u64, index: u64) -> Pcg64Mcg {
 fn wanted(random: &mut Pcg64Mcg, arm: Arm, index: u64) -> Vec<(Hidden, f64)> {
     let count = match arm {
         Arm::Null | Arm::HeavyNull => 0,
-        Arm::Catalogue | Arm::Foreign => how_many(random),
+        Arm::Catalogue | Arm::Foreign | Arm::Designed => how_many(random),
         _ => 1,
     };
     let mut effects = Vec::<(Hidden, f64)>::new();
     while effects.len() < count {
         let class = match arm {
             // Every class equally often.
-            Arm::LeftOut | Arm::Alone | Arm::Limit => in_turn(&Class::ALL, index),
-            Arm::Own | Arm::OwnLeftOut => in_turn(&Class::OWN, index),
-            Arm::Confusable | Arm::TwoRounds => {
-                Class::CONFUSABLE[(index % Class::CONFUSABLE.len() as u64) as usize].0
+            Arm::LeftOut | Arm::DesignedLeftOut | Arm::Alone | Arm::Limit => {
+                in_turn(&Class::ALL, index)
             }
+            Arm::Own | Arm::OwnLeftOut => in_turn(&Class::OWN, index),
+            Arm::Confusable | Arm::TwoRounds => confusable(index),
+            Arm::DesignedTwoRounds if !designed::is_small(arm, index) => confusable(index / 2),
             _ => *Class::ALL.choose(random).unwrap_or(&Class::Backlash),
         };
-        let mut hidden = draw(random, class, arm == Arm::Foreign);
+        let mut hidden = draw(random, class, is_foreign(arm, index));
         let classes = match arm {
             Arm::Alone | Arm::Limit => Some(Class::ALL.len()),
             Arm::Own => Some(Class::OWN.len()),
@@ -144,7 +161,7 @@ fn wanted(random: &mut Pcg64Mcg, arm: Arm, index: u64) -> Vec<(Hidden, f64)> {
         let is_new =
             |(other, _): &(Hidden, f64)| other.class != hidden.class || other.axis != hidden.axis;
         if effects.iter().all(is_new) {
-            let d = log_uniform(random, range_of(arm));
+            let d = log_uniform(random, range_of(arm, index));
             effects.push((hidden, d));
         }
     }
@@ -153,6 +170,15 @@ fn wanted(random: &mut Pcg64Mcg, arm: Arm, index: u64) -> Vec<(Hidden, f64)> {
 
 fn in_turn(classes: &[Class], index: u64) -> Class {
     classes[(index % classes.len() as u64) as usize]
+}
+
+const fn confusable(index: u64) -> Class {
+    Class::CONFUSABLE[(index % Class::CONFUSABLE.len() as u64) as usize].0
+}
+
+/// Whether forms are not quite the catalogue's.
+const fn is_foreign(arm: Arm, index: u64) -> bool {
+    matches!(arm, Arm::Foreign) || designed::is_foreign(arm, index)
 }
 
 const fn has_own_programmes(arm: Arm) -> bool {
@@ -164,10 +190,15 @@ const fn hides_nothing(arm: Arm, index: u64) -> bool {
     matches!(arm, Arm::Own) && (index / Class::OWN.len() as u64) % 4 == 3
 }
 
-const fn range_of(arm: Arm) -> [f64; 2] {
+/// Whether effects are about as small as can just be named, whatever the least size that machines have.
+const fn is_about_the_limit(arm: Arm, index: u64) -> bool {
+    matches!(arm, Arm::Limit) || designed::is_small(arm, index)
+}
+
+const fn range_of(arm: Arm, index: u64) -> [f64; 2] {
     match arm {
         Arm::Alone => LARGE_D_RANGE,
-        Arm::Limit => SMALL_D,
+        _ if is_about_the_limit(arm, index) => SMALL_D,
         _ => D,
     }
 }
@@ -191,25 +222,18 @@ fn scaled(
     bare: &Deviations,
     hidden: Hidden,
     wanted: f64,
-    arm: Arm,
+    (arm, index): (Arm, u64),
 ) -> Result<(Hidden, f64), TrialError> {
-    let d_of = |hidden: &Hidden| -> Result<f64, TrialError> {
-        if hidden.class == Class::LatencyJitter {
-            return Ok(own::jitter_d(hidden.size));
-        }
-        let mut with = rig.clone();
-        hidden.hide(&mut with)?;
-        Ok(deviations(&with)?.d_against(bare, &rig.scatter, rig.shaking_mm2()))
-    };
     let ([low, high], _) = hidden.class.sizes();
-    let low = if arm == Arm::Limit { 0.0 } else { low };
-    let mut found = (hidden, d_of(&hidden)?);
+    let is_small = is_about_the_limit(arm, index);
+    let low = if is_small { 0.0 } else { low };
+    let mut found = (hidden, d_of(rig, bare, &hidden)?);
     // D grows with the size, if not always in proportion to it.
     for _ in 0..if has_own_programmes(arm) { 2 } else { 1 } {
         let (sized, d) = found;
         let size = (sized.size.abs() * wanted / d.max(1e-6)).max(low).min(high);
         let sized = sized.sized(size.copysign(hidden.size));
-        found = (sized, d_of(&sized)?);
+        found = (sized, d_of(rig, bare, &sized)?);
         if (found.1 / wanted).ln().abs() < NEAR_D {
             break;
         }
@@ -217,13 +241,28 @@ fn scaled(
     Ok(found)
 }
 
+/// D of an effect that is hidden in a machine, whose session without it is `bare`.
+pub(crate) fn d_of(rig: &Rig, bare: &Deviations, hidden: &Hidden) -> Result<f64, TrialError> {
+    if hidden.class == Class::LatencyJitter {
+        return Ok(own::jitter_d(hidden.size));
+    }
+    let mut with = rig.clone();
+    hidden.hide(&mut with)?;
+    let (with, _) = deviations(&with)?;
+    Ok(with.d_against(bare, &rig.scatter, rig.shaking_mm2()))
+}
+
 /// The same machine and programme with the touches at the end: when a touch comes depends on what is hidden, and would
-/// shift every reading behind it.
+/// shift every reading behind it. What warms or waits stays between the tests before it and those behind it.
 fn touched_last(rig: &Rig) -> Rig {
     let mut sorted = rig.clone();
     sorted.has_motors = true;
     let is_touch = |step: &Step| matches!(step, Step::Latency { .. });
-    sorted.plan.steps.sort_by_key(is_touch);
+    let passes_time = |step: &Step| matches!(step, Step::Produce { .. } | Step::Wait { .. });
+    let is_one = |a: &Step, b: &Step| !passes_time(a) && !passes_time(b);
+    for stretch in sorted.plan.steps.chunk_by_mut(is_one) {
+        stretch.sort_by_key(is_touch);
+    }
     sorted
 }
 
@@ -239,12 +278,13 @@ fn commissioned(rig: &mut Rig) -> Result<Deviations, TrialError> {
     Ok(deviations)
 }
 
-fn deviations(rig: &Rig) -> Result<Deviations, TrialError> {
+/// A session by its deviations, and the time that its programs took, min.
+pub(crate) fn deviations(rig: &Rig) -> Result<(Deviations, f64), TrialError> {
     let mut deviations = Deviations::default();
-    measure(&touched_last(rig), &mut |at, sample| {
+    let program_min = timed(&touched_last(rig), &mut |at, sample| {
         deviations.take(at, &sample);
     })?;
-    Ok(deviations)
+    Ok((deviations, program_min))
 }
 
 #[cfg(test)]
@@ -272,12 +312,12 @@ mod tests {
     fn late_stamps_have_a_size_that_grows_with_them() {
         let mut random = stream(Arm::Catalogue, 2, 0);
         let rig = Rig::draw(&mut random, false).unwrap();
-        let bare = deviations(&rig).unwrap();
+        let (bare, _) = deviations(&rig).unwrap();
         let d = |late_ms: f64| {
             let hidden = draw(&mut Pcg64Mcg::seed_from_u64(1), Class::ClockOffset, false);
             let mut with = rig.clone();
             hidden.sized(late_ms).hide(&mut with).unwrap();
-            let with = deviations(&with).unwrap();
+            let (with, _) = deviations(&with).unwrap();
             with.d_against(&bare, &rig.scatter, 0.0)
         };
         let (small, large) = (d(0.05), d(0.1));

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
+use crate::designed::DesignedTruth;
 use crate::effect::{Class, Hidden};
 use crate::shop::ShopTruth;
 
@@ -38,6 +39,9 @@ pub struct Truth {
     /// What is true of a shop's session, of which the fields above say nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shop: Option<ShopTruth>,
+    /// What a designed programme was, where one was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub designed: Option<DesignedTruth>,
 }
 
 impl Truth {
@@ -57,6 +61,7 @@ impl Truth {
             bare_um: None,
             measure: MEASURE,
             shop: Some(shop),
+            designed: None,
         }
     }
 }
@@ -92,6 +97,9 @@ pub struct TrueEffect {
     /// Size against the trial's scatter.
     #[serde(rename = "D")]
     pub d: f64,
+    /// The same on the common programme, where a designed one was measured.
+    #[serde(rename = "common_D", default, skip_serializing_if = "Option::is_none")]
+    pub common_d: Option<f64>,
 }
 
 impl TrueEffect {
@@ -110,6 +118,7 @@ impl TrueEffect {
                 .into_iter()
                 .collect(),
             d,
+            common_d: None,
         }
     }
 }

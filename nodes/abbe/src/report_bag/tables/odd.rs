@@ -1,6 +1,5 @@
 //! Tables with odd cells, and logs whose times have no unit.
 
-use super::alone::reported_alone;
 use super::*;
 
 /// Five runs over five targets both ways; `odd`: line and column (from 0) of a cell with another word.

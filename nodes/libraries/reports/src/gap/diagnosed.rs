@@ -12,7 +12,9 @@ use crate::loss;
 pub struct Diagnosed {
     /// What was found.
     pub diagnosis: Diagnosis,
-    /// What was left out, in words.
+    /// What of the runs could not be used, in words.
+    pub omitted: Vec<String>,
+    /// What was left out and is no loss, in words.
     pub remarks: Vec<String>,
     /// What of each bag was read, lost and left out.
     pub readings: Vec<Reading>,
@@ -29,7 +31,9 @@ pub struct Diagnosed {
 impl Diagnosed {
     /// What was lost or left out, in words.
     pub fn losses(&self) -> Vec<String> {
-        loss::lines(&self.readings)
+        let mut lines = loss::lines(&self.readings);
+        lines.extend(self.omitted.iter().cloned());
+        lines
     }
 
     /// The report as JSON, with what is known beside the diagnosis: losses, defaults in use, the simulator, what was not considered.
@@ -37,14 +41,17 @@ impl Diagnosed {
     /// # Errors
     /// When a number has no place in JSON.
     pub fn json(&self) -> Result<serde_json::Value> {
-        let is_whole = self.readings.iter().all(Reading::is_whole);
+        let is_whole = self.losses().is_empty();
+        let of_runs = (!self.omitted.is_empty())
+            .then(|| serde_json::json!({ "omitted_of_runs": self.omitted }));
         let is_limited = !(self.without.is_empty() && self.ablated.is_empty());
         let simulated = self.simulated.as_ref().map(serde_json::to_value);
         let report = GapReport {
             loss: if is_whole {
                 vec![]
             } else {
-                self.readings.iter().map(loss::as_json).collect()
+                let bags = self.readings.iter().map(loss::as_json);
+                bags.chain(of_runs).collect()
             },
             machine_defaults: self.defaults.clone(),
             simulated: simulated.transpose()?,

@@ -7,13 +7,10 @@ use serde::{Deserialize, Serialize};
 use super::judge::{Call, followed, has_alarm, is_found, wrong_names};
 use super::truth::{ShopEffect, ShopTruth};
 use crate::arm::Arm;
+use crate::detection::{MIN_D_TO_FIND, by_d, size_to_find};
 use crate::proportion::{Proportion, median};
 use crate::verdict::Verdict;
 
-/// D beyond which an effect should be found.
-pub const MIN_D_TO_FIND: f64 = 20.0;
-/// Edge between the two lower bins.
-const MIDDLE_D: f64 = 10.0;
 /// Edge between little and much noise that neighbouring readings share.
 const MUCH_MEMORY: f64 = 0.5;
 /// Errors of lag and growth that are allowed.
@@ -253,16 +250,10 @@ fn of_temperatures(large: &[Effect<'_>]) -> [Line; 3] {
     ]
 }
 
-fn bins(all: &[(&Verdict, &ShopEffect)]) -> [Proportion; 3] {
-    [
-        [0.0, MIDDLE_D],
-        [MIDDLE_D, MIN_D_TO_FIND],
-        [MIN_D_TO_FIND, f64::INFINITY],
-    ]
-    .map(|[low, high]| {
-        let own = { all.iter() }.filter(|(_, e)| e.d > low && e.d <= high && !e.names.is_empty());
-        Proportion::of(own.map(|(verdict, effect)| is_found(verdict, effect)))
-    })
+fn bins(all: &[Effect<'_>]) -> [Proportion; 3] {
+    let own = all.iter().filter(|(_, effect)| !effect.names.is_empty());
+    let own = own.map(|(verdict, effect)| (effect.d, is_found(verdict, effect)));
+    by_d(&own.collect::<Vec<_>>())
 }
 
 /// By what is hidden; what cannot be told from something else stands apart.
@@ -278,16 +269,14 @@ fn kinds(answered: &[Judged<'_>]) -> Vec<Split> {
         by.entry(what).or_default().push((verdict, effect));
     }
     let split = |(what, all): (String, Vec<(&Verdict, &ShopEffect)>)| {
-        let sizes = all
-            .iter()
-            .map(|(_, e)| e.size.abs() * MIN_D_TO_FIND / e.d.max(1e-9));
+        let size = size_to_find(all.iter().map(|(_, effect)| (effect.size, effect.d)));
         let unit = all
             .first()
             .map_or_else(String::new, |(_, effect)| effect.unit.clone());
         Split {
             found: bins(&all),
             wrong: Proportion::of(all.iter().map(|(verdict, _)| has_wrong(verdict))),
-            size_of_d_20: median(sizes.collect()).map(|size| (size, unit)),
+            size_of_d_20: size.map(|size| (size, unit)),
             what,
         }
     };
