@@ -11,7 +11,7 @@ use crate::evaluate::Tests;
 use crate::evaluate::angular::RotaryTest;
 use crate::evaluate::budget::{Budget, unstate};
 use crate::evaluate::linear::STOP_SETTLE;
-use crate::positioning::with_u;
+use crate::positioning::{few_runs, with_u};
 
 /// Seconds of arc of a radian.
 const ARCSEC_PER_RAD: f64 = 648_000.0 / std::f64::consts::PI;
@@ -158,10 +158,7 @@ fn answer(result: &RotaryResult, stated: bool) -> String {
 
 fn in_words(remark: &RotaryRemark) -> String {
     match remark {
-        RotaryRemark::FewRuns { n_runs, required } => {
-            let runs = if *n_runs == 1 { "run" } else { "runs" };
-            format!("{n_runs} {runs} in each direction; the standard asks for {required}.")
-        }
+        RotaryRemark::FewRuns { n_runs, required } => few_runs(*n_runs, *required),
         RotaryRemark::FewTargets {
             n_targets,
             required,
