@@ -127,7 +127,7 @@ impl Diagnose {
         let budget = self.budget.as_deref().map(Budget::open).transpose()?;
         let limits = self.limits.open()?;
         let mut diagnosed = beside(&opened.bags, &self.simulated, &name, &text, &config)?;
-        opened.name_as_given(&mut diagnosed.diagnosis.report, &self.bags);
+        opened.name_as_given(&mut diagnosed, &self.bags);
         let machine = MachineFile::parse(&text, &name)?.name;
         let title = format!("Simulator against machine: {machine}");
         let mut page = gap::page(&title, &diagnosed, self.explain)?;

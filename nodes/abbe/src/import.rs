@@ -226,7 +226,7 @@ pub(crate) fn import(
     folder.finish()?;
     let mut notes = doubts(&map, &runs);
     notes.extend(written.in_words());
-    notes.extend(cells.form.map(|form| format!("a {form}")));
+    notes.extend(cells.form.map(str::to_owned));
     notes.extend(cells.note);
     notes.extend(cells.remarks);
     notes.extend(table.left_out);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use gap_diagnosis::GapReport;
+use reports::gap::diagnosed::Diagnosed;
 
 use crate::import::Named;
 use crate::report_bag::from_table::{self, FromTable};
@@ -75,10 +75,17 @@ impl Opened {
         self.tables.iter().all(|table| table.n_odd == 0)
     }
 
-    /// Names bags in a report as they were given: the folder of a table is no more when it is read.
-    pub fn name_as_given(&self, report: &mut GapReport, given: &[PathBuf]) {
-        for (bag, path) in report.inputs.bags.iter_mut().zip(given) {
-            bag.path = path.display().to_string();
+    /// Names bags as they were given: the folder of a table is no more when the report is read.
+    pub fn name_as_given(&self, diagnosed: &mut Diagnosed, given: &[PathBuf]) {
+        let inputs = diagnosed.diagnosis.report.inputs.bags.iter_mut();
+        for (input, path) in inputs.zip(given) {
+            input.path = path.display().to_string();
+        }
+        for (bag, path) in self.bags.iter().zip(given) {
+            let [bag, path] = [bag, path].map(|path| path.display().to_string());
+            for remark in &mut diagnosed.remarks {
+                *remark = remark.replace(&bag, &path);
+            }
         }
     }
 }

@@ -29,7 +29,7 @@ enum Content {
 }
 
 /// The forms that are known, one a line.
-const INSTRUMENTS: [Instrument; 4] = [
+static INSTRUMENTS: [Instrument; 4] = [
     Instrument {
         name: "Renishaw laser file (rtl, rta)",
         is_one: renishaw_laser::is_one,
@@ -80,7 +80,7 @@ impl Instrument {
     pub fn cells(&self, bytes: &[u8], decimal: char) -> Result<Cells> {
         let read = match self.content {
             Content::Table(read) => read,
-            Content::Refused(why) => bail!("a {}: {why}", self.name),
+            Content::Refused(why) => bail!("{}: {why}", self.name),
         };
         // Names of machines may be in any encoding, and numbers are ASCII.
         let text = String::from_utf8_lossy(bytes);
@@ -151,7 +151,10 @@ mod tests {
         ] {
             let form = of(text.as_bytes()).expect(text);
             let said = form.cells(text.as_bytes(), '.').unwrap_err().to_string();
-            assert!(said.starts_with("a ") && said.contains(words), "{said}");
+            assert!(
+                said.starts_with(form.name) && said.contains(words),
+                "{said}"
+            );
         }
     }
 

@@ -428,6 +428,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::too_many_lines, reason = "a table of cases")]
     fn damaged_files_are_refused_with_line_and_value() {
         for (from, to, words) in [
             (

@@ -6,6 +6,7 @@ use tempfile::TempDir;
 use super::*;
 use crate::import::Import;
 mod conditions;
+mod instruments;
 mod odd;
 
 const REFERENCE: &str = include_str!("../../../../tests/validation/iso230_tables.json");

@@ -268,7 +268,7 @@ fn by_thermometers(f: &mut fmt::Formatter<'_>, channel: &str, found: &ThermalFit
         };
         let size = one.um_per_k.abs();
         let error = one.standard_error_um_per_k;
-        let decimals = decimals_of(if error > 0.0 { error } else { 1e-2 * size });
+        let decimals = decimals_of(if error > 0.0 { error } else { 0.1 * size });
         format!(
             "{} {lag}, {:.decimals$} µm/K",
             one.thermometer, one.um_per_k

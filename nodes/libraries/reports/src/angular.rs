@@ -11,7 +11,7 @@ use crate::evaluate::Tests;
 use crate::evaluate::angular::RotaryTest;
 use crate::evaluate::budget::{Budget, unstate};
 use crate::evaluate::linear::STOP_SETTLE;
-use crate::positioning::with_u;
+use crate::positioning::{few_runs, with_u};
 
 /// Seconds of arc of a radian.
 const ARCSEC_PER_RAD: f64 = 648_000.0 / std::f64::consts::PI;
@@ -158,9 +158,7 @@ fn answer(result: &RotaryResult, stated: bool) -> String {
 
 fn in_words(remark: &RotaryRemark) -> String {
     match remark {
-        RotaryRemark::FewRuns { n_runs, required } => {
-            format!("{n_runs} runs in each direction; the standard asks for {required}.")
-        }
+        RotaryRemark::FewRuns { n_runs, required } => few_runs(*n_runs, *required),
         RotaryRemark::FewTargets {
             n_targets,
             required,
@@ -187,15 +185,12 @@ fn table(result: &RotaryResult, stated: bool) -> Rows {
         let cells = values.map(|value| cell(value, stated));
         std::iter::once(name.to_owned()).chain(cells).collect()
     };
-    let of_scatter = |name: &str, values: [Option<Option<ExpandedAngle>>; 3]| {
-        row(name, values.map(Option::flatten))
-    };
-    let accuracy = of_scatter(
+    let accuracy = row(
         "accuracy A",
         [
-            up.map(|one| one.accuracy),
-            down.map(|one| one.accuracy),
-            both.map(|one| one.accuracy),
+            up.and_then(|one| one.accuracy),
+            down.and_then(|one| one.accuracy),
+            both.and_then(|one| one.accuracy),
         ],
     );
     let systematic = row(
@@ -206,12 +201,12 @@ fn table(result: &RotaryResult, stated: bool) -> Rows {
             both.map(|one| one.systematic_error),
         ],
     );
-    let repeatability = of_scatter(
+    let repeatability = row(
         "repeatability R",
         [
-            up.map(|one| one.repeatability),
-            down.map(|one| one.repeatability),
-            both.map(|one| one.repeatability),
+            up.and_then(|one| one.repeatability),
+            down.and_then(|one| one.repeatability),
+            both.and_then(|one| one.repeatability),
         ],
     );
     let of_both = |name: &str, value: Option<ExpandedAngle>| row(name, [None, None, value]);

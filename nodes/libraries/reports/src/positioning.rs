@@ -397,11 +397,15 @@ fn state_remarks(section: &mut Section, remarks: &[PositioningRemark]) {
     }
 }
 
+/// Fewer runs than a standard asks for.
+pub(crate) fn few_runs(n_runs: usize, required: usize) -> String {
+    let runs = if n_runs == 1 { "run" } else { "runs" };
+    format!("{n_runs} {runs} in each direction; the standard asks for {required}.")
+}
+
 fn remark_in_words(remark: &PositioningRemark) -> String {
     match remark {
-        PositioningRemark::FewRuns { n_runs, required } => {
-            format!("{n_runs} runs in each direction; the standard asks for {required}.")
-        }
+        PositioningRemark::FewRuns { n_runs, required } => few_runs(*n_runs, *required),
         PositioningRemark::FewTargets {
             n_targets,
             required,

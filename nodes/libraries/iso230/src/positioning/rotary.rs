@@ -20,8 +20,8 @@
 //!
 //! # Holds when
 //! u_D is that of the angle between two positions, as (3) has it once; where a certificate states U of one position, √2 of it
-//! is meant. A single run has B, E and M alone, as [`super::single_run`]. The reference measures the angle about the axis; its alignment and eccentricity are in its own uncertainty. The number
-//! of targets asked for is that of an axis of at most one turn.
+//! is meant. The reference measures the angle about the axis; its alignment and eccentricity are in its own uncertainty. The number
+//! of targets asked for is that of an axis of at most one turn. A single run has B, E and M alone, as [`super::single_run`].
 //!
 //! # Agreement
 //! By hand: `val_a_rotary_axis_by_hand`, below 1e-15 rad. Second implementation: a table of a turn that wraps by numpy,
