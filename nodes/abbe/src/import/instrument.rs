@@ -9,7 +9,7 @@ use super::renishaw_laser;
 use super::sheet::Cells;
 
 /// Bytes from the begin of a file by which its form is known.
-const LOOKED_AT: usize = 256 << 10;
+const BYTES_LOOKED_AT: usize = 256 << 10;
 
 /// A form of files.
 pub struct Instrument {
@@ -66,7 +66,7 @@ fn is_ballbar(text: &str) -> bool {
 
 /// The form that a file is of; none of those that are known.
 pub fn of(bytes: &[u8]) -> Option<&'static Instrument> {
-    let begin = bytes.get(..LOOKED_AT).unwrap_or(bytes);
+    let begin = bytes.get(..BYTES_LOOKED_AT).unwrap_or(bytes);
     let text = String::from_utf8_lossy(begin);
     let text = text.trim_start_matches('\u{feff}');
     INSTRUMENTS.iter().find(|form| (form.is_one)(text))
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn no_bytes_make_it_fail_and_a_long_file_is_looked_at_from_its_begin() {
-        let mut long = vec![0xFF; LOOKED_AT + 7];
+        let mut long = vec![0xFF; BYTES_LOOKED_AT + 7];
         assert!(of(&long).is_none());
         long.extend(b"HEADER::\nTARGET DATA::\n");
         assert!(of(&long).is_none());

@@ -544,9 +544,8 @@ mod tests {
         seen.has_length = true;
         seen.feeds_mm_s = vec![100.0];
         let cell = |conditions: &Conditions, name: &str| -> String {
-            let rows = &conditions.section.tables[0].rows;
-            let found = rows.iter().find(|row| row[0] == name);
-            found.unwrap_or_else(|| panic!("{name}: {rows:?}"))[1].clone()
+            let mut rows = conditions.section.tables[0].rows.iter();
+            rows.find(|row| row[0] == name).unwrap()[1].clone()
         };
         let silent = of(&seen, None, None);
         assert_eq!(
@@ -571,10 +570,7 @@ mod tests {
         let text = text.split("instruments:").next().unwrap();
         let budget = Budget::read(text, Path::new("budget.yaml")).unwrap();
         let stated = of(&seen, Some(&budget), None).terminal();
-        assert!(
-            stated.contains("no thermometer was read: machine 2"),
-            "{stated}"
-        );
+        assert!(stated.contains("no thermometer was read: machine 2"));
         assert!(!stated.contains("Temperatures not stated"), "{stated}");
         seen.thermometers
             .insert("bed".to_owned(), Readings::new(21.5));
@@ -589,14 +585,17 @@ mod tests {
         let laser = "a laser; serial number 12-3; certificate K 7 of 2026-01-02";
         assert_eq!(fact(&whole, "Length reference"), laser);
         assert_eq!(fact(&whole, "Temperature"), "bed 21.50 to 21.50 °C");
-        let instrument = &whole.section.figures["instruments"][0];
-        assert_eq!(instrument["certificate"], "K 7 of 2026-01-02");
-        let terminal = whole.terminal();
-        assert!(
-            terminal.contains("dwell not stated; production"),
-            "{terminal}"
+        assert_eq!(
+            whole.section.figures["instruments"][0]["certificate"],
+            "K 7 of 2026-01-02"
         );
-        assert!(terminal.contains("operator A. B."), "{terminal}");
-        assert!(terminal.contains("bed 21.50 to 21.50 °C (range 0.00 K)"));
+        let terminal = whole.terminal();
+        for words in [
+            "dwell not stated; production",
+            "operator A. B.",
+            "bed 21.50 to 21.50 °C (range 0.00 K)",
+        ] {
+            assert!(terminal.contains(words), "{terminal}");
+        }
     }
 }

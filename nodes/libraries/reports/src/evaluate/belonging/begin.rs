@@ -4,7 +4,7 @@ use metrology::number::number;
 use metrology::sample::{FARTHEST_FROM_NOMINAL, Sense, TestKind, TestPlane, TestSegment};
 
 /// Lengths of begin and end that differ by less are one, mm and mm/s.
-const SAME: f64 = 1e-6;
+const SAME_NUMBER: f64 = 1e-6;
 /// Greatest feed of a machine tool, mm/s.
 const GREATEST_FEED_MM_S: f64 = 10_000.0;
 
@@ -46,7 +46,7 @@ pub(super) fn contradiction(begin: &TestSegment, end: &TestSegment) -> Option<St
         ("feed_m_s", begin.feed_mm_s, end.feed_mm_s),
     ];
     for (name, first, last) in lengths {
-        if last.abs() > SAME && (last - first).abs() > SAME {
+        if last.abs() > SAME_NUMBER && (last - first).abs() > SAME_NUMBER {
             let [first, last] = [first, last].map(|mm| number(mm * 1e-3));
             return Some(format!(
                 "{name} = {first} at its begin and {last} at its end"

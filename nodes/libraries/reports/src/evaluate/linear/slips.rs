@@ -251,7 +251,7 @@ mod tests {
             panic!("{found:?}");
         };
         let words =
-            "the deviation of run 3 at 20.000 mm up is 60 µm; the other runs have 4.2 to 5 µm";
+            "the deviation of run 3 at 20.000 mm up is 60 µm; the other runs have 4.2 µm to 5 µm";
         assert!(far.starts_with(words), "{far}");
         assert_eq!(of(rows(Some(0.007))).0, Outlying::default());
     }
