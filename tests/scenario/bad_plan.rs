@@ -47,7 +47,7 @@ fn bad_steps_are_refused_with_their_place_and_values() {
         (latency("60.0, 30000.0", 3), &["steps[1]", "30000 mm/min"]),
         (
             "{do: scan, axis: X, from_mm: -50.0, to_mm: 50.0, spacing_mm: 10.0, runs: 1, feed_mm_min: 6000.0, overrun_mm: 2.0, at_mm: [0.0, 0.0, 120.0]}".to_owned(),
-            &["steps[1]", "overrun_mm = 2", "6000 mm/min", "only 14.2 mm before"],
+            &["steps[1]", "overrun_mm = 2", "6000 mm/min", "must be at least 14.2 mm"],
         ),
         (
             "{do: artefact, id: bore_9, points: 8}".to_owned(),
