@@ -58,7 +58,9 @@ pub fn check(time: &Known, first: f64) -> Result<Option<String>> {
             );
         }
     }
-    if epoch::likely_unit(first).is_none() {
+    // A time from zero may begin before it.
+    let is_beyond = first > epoch::END_S as f64 - times::LONGEST_LOG_S;
+    if is_beyond && epoch::likely_unit(first).is_none() {
         check_start(time, first)?;
     }
     let is_labview = first > LATEST_S && is_measured(first - LABVIEW_1970_S);
@@ -116,6 +118,7 @@ mod tests {
             1_767_600_000e6,
             1_767_600_000e9,
             0.0,
+            -60.0,
             45_000.0,
         ] {
             assert_eq!(checked(first).unwrap(), None, "{first}");
