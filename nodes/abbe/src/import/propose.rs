@@ -356,7 +356,7 @@ impl<'t> Text<'t> {
             self.recognised
                 .push(format!("dates before its times: column \"{dates}\""));
         }
-        match times::of_text(&time.first)? {
+        match epochs::of_first(time)? {
             Some(first_s) => self.start_s = first_s,
             None => self.time_unit(time)?,
         }

@@ -1,9 +1,11 @@
 //! Times that count from other days than 1970-01-01, as some programs write them.
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use metrology::yaml::shown;
+use metrology::{Host, epoch};
 
 use super::super::recognise::Known;
+use super::super::times;
 
 /// From 1990 to 2100, s since 1970 (`date -u -d 1990-01-01 +%s`): measurements are in between.
 const MEASURED_S: [f64; 2] = [631_152_000.0, 4_102_444_800.0];
@@ -17,6 +19,27 @@ const TICKS_A_SECOND: f64 = 1e7;
 const LABVIEW_1970_S: f64 = 2_082_844_800.0;
 /// No measurement is later, s since 1970: 2060.
 const LATEST_S: f64 = 2_840_140_800.0;
+
+/// The first time of a column, s since 1970 or of its day; none of a plain number.
+///
+/// # Errors
+/// With the cell, where it is no time, or none from which a log has room before 2106.
+pub fn of_first(time: &Known) -> Result<Option<f64>> {
+    let first_s = times::of_text(&time.first)?;
+    if let Some(first_s) = first_s {
+        check_start(time, first_s)?;
+    }
+    Ok(first_s)
+}
+
+fn check_start(time: &Known, first_s: f64) -> Result<()> {
+    epoch::whole_seconds::<Host>(first_s as i64, times::LONGEST_LOG_S as i64)
+        .map(|_| ())
+        .map_err(|error| {
+            let (name, cell) = (shown(&time.name), shown(&time.first));
+            anyhow!("column \"{name}\": \"{cell}\": a log begins {error}")
+        })
+}
 
 fn is_measured(time_s: f64) -> bool {
     (MEASURED_S[0]..MEASURED_S[1]).contains(&time_s)
@@ -34,6 +57,11 @@ pub fn check(time: &Known, first: f64) -> Result<Option<String>> {
                 "column \"{name}\": \"{cell}\": looks like {what}, of 100 ns since the year {year}: write seconds since the first row, or state their unit in a map (units)"
             );
         }
+    }
+    // A time from zero may begin before it.
+    let is_beyond = first > epoch::END_S as f64 - times::LONGEST_LOG_S;
+    if is_beyond && epoch::likely_unit(first).is_none() {
+        check_start(time, first)?;
     }
     let is_labview = first > LATEST_S && is_measured(first - LABVIEW_1970_S);
     Ok(is_labview.then(|| {
@@ -73,6 +101,16 @@ mod tests {
             let said = checked(first).unwrap().unwrap();
             assert!(said.contains("subtract 2082844800"), "{said}");
         }
+        for first in [4_300_000_000.0, 9e9, 1e12, 1e25] {
+            let said = checked(first).map_err(|error| error.to_string());
+            let is_refused = said
+                .as_ref()
+                .is_err_and(|said| said.starts_with("column \"time\": \""));
+            assert!(
+                is_refused || first.total_cmp(&1e12).is_eq(),
+                "{first}: {said:?}"
+            );
+        }
         // 2026 since 1970 in s, ms, us and ns, and times from zero.
         for first in [
             1_767_600_000.0,
@@ -80,6 +118,7 @@ mod tests {
             1_767_600_000e6,
             1_767_600_000e9,
             0.0,
+            -60.0,
             45_000.0,
         ] {
             assert_eq!(checked(first).unwrap(), None, "{first}");
