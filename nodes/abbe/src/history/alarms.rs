@@ -13,9 +13,8 @@ use history::{
 };
 use node_runtime::{complain, text_file};
 use reports::Report;
-use reports::evaluate::limits::Limits;
 use reports::evaluate::limits::alarms::{Judged, Observed, State};
-use reports::evaluate::limits::of_axis;
+use reports::evaluate::limits::{Limits, figure_in_words, of_axis};
 use reports::screen::{Tile, Tone};
 use reports::section::{Rows, Section, head};
 use reports::terminal::Rank;
@@ -256,7 +255,7 @@ impl Alarms {
         }
         let tile = tile(format!("{n} of {all} exceed it"));
         screen.tiles.insert(0, tile.toned(Tone::Bad));
-        screen.lacks.splice(0..0, self.lines());
+        screen.lacks.splice(0..0, self.lines_in_words());
         if let Some((sentence, tone)) = &mut screen.verdict {
             *sentence = format!("{} {sentence}", self.in_short());
             *tone = Tone::Bad;
@@ -287,6 +286,17 @@ impl Alarms {
             ));
         }
         lines
+    }
+
+    /// The same with figures of a standard in words, for a page.
+    fn lines_in_words(&self) -> Vec<String> {
+        let names = self.raised().map(|row| row.series.name.as_str());
+        let names: Vec<&str> = names.filter(|name| name.starts_with("iso")).collect();
+        let in_words = |line: String| match names.iter().find(|name| line.contains(**name)) {
+            Some(name) => line.replace(name, &figure_in_words(name)),
+            None => line,
+        };
+        self.lines().into_iter().map(in_words).collect()
     }
 
     /// The conditions for `/diagnostics`: each figure with a limit, so that one that is within it again is known too.

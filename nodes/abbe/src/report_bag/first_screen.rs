@@ -217,7 +217,11 @@ fn tiles_of(section: &Section) -> Vec<Tile> {
         .into_iter()
         .enumerate()
         .map(|(place, (name, figure))| {
-            let more = if place == 0 { about.as_str() } else { for_all };
+            let more = match place {
+                0 => about.as_str(),
+                _ if figure.contains('±') => for_all,
+                _ => "",
+            };
             Tile::new(&name, figure, more)
         });
     tiles.take(MOST_ANSWERS_ON_TILES).collect()

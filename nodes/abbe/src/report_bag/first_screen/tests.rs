@@ -176,7 +176,7 @@ fn a_test_that_stands_alone_has_a_tile_for_each_of_its_figures() {
     assert_eq!(found[0].1, "8.50 ± 0.40 µm");
     assert_eq!(found[0].2, "Positioning X, run 1 on; ± U, k = 2");
     assert_eq!(found[2].2, "± U, k = 2");
-    let drift = shown("range 23.67 µm; -14.69 µm after an hour, -23.65 µm after three.");
+    let drift = shown("range 23.67 µm; -14.69 µm after an hour, -23.65 µm after three hours.");
     assert_eq!(drift[1].0, "after an hour");
     assert_eq!(drift[1].1, "-14.69 µm");
     assert_eq!(shown("G 3.00 µm.").len(), 1);

@@ -93,7 +93,9 @@ fn in_short(range: &str, [after_1_h, after_3_h]: [&String; 2], found: &Figures) 
         (false, _) => format!("range {range} µm."),
         (true, false) => format!("range {range} µm; {after_1_h} µm after an hour."),
         (true, true) => {
-            format!("range {range} µm; {after_1_h} µm after an hour, {after_3_h} µm after three.")
+            format!(
+                "range {range} µm; {after_1_h} µm after an hour, {after_3_h} µm after three hours."
+            )
         }
     }
 }

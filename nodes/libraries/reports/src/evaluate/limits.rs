@@ -32,8 +32,8 @@ pub mod webhook;
 
 use crate::section::{Rows, Section, head};
 use crate::terminal::Rank;
-pub use judged::CONFORMS;
 use judged::{BEFORE_STANDARD, Figure, Judged};
+pub use judged::{CONFORMS, figure_in_words};
 use limit::Limit;
 use webhook::Webhook;
 

@@ -175,7 +175,7 @@ impl Judged {
             (value, format!("{:.3}", self.probability))
         };
         vec![
-            in_words(name),
+            figure_in_words(name),
             shown_title(test),
             value,
             limits,
@@ -189,7 +189,8 @@ impl Judged {
 pub const BEFORE_STANDARD: &str = ", ISO ";
 
 /// The name of a figure in words with its standard: `up accuracy, ISO 230-2` of `iso230_2.up.accuracy`.
-fn in_words(name: &str) -> String {
+#[must_use]
+pub fn figure_in_words(name: &str) -> String {
     let (family, own) = name.split_once('.').unwrap_or(("", name));
     let own = own.strip_prefix("figures.").unwrap_or(own);
     let own = own.replace(['_', '.'], " ");
@@ -221,7 +222,7 @@ mod tests {
             ("iso230_3_log.figures.range", "range, ISO 230-3"),
             ("own", "own"),
         ] {
-            assert_eq!(super::in_words(name), words);
+            assert_eq!(super::figure_in_words(name), words);
         }
     }
 
