@@ -137,7 +137,7 @@ fn a_scenario_whose_disk_fills_is_called_off_and_tells_its_page_and_what_is_lost
                 "bag_0.mcap",
                 "no space",
                 "called off",
-                "abbe: what did not go as told",
+                "abbe: what did not go as planned",
             ] {
                 assert!(ended.said.contains(word), "{word}: {}", ended.said);
             }

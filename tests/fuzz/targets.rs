@@ -20,13 +20,14 @@ use crate::messages;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// Every target.
-pub const TARGETS: [Target; 14] = [
+pub const TARGETS: [Target; 15] = [
     ("cdr", cdr),
     ("definition", definition),
     ("mcap", mcap),
     ("gcode", gcode),
     ("machine_file", machine_file),
     ("csv_import", csv_import),
+    ("laser_file", laser_file),
     ("linuxcnc", linuxcnc),
     ("shdr", shdr),
     ("agent", agent),
@@ -153,6 +154,14 @@ pub fn csv_import(data: &[u8]) {
     {
         let mut writer = import::writer::Writer::default();
         let _ = import::motion::write(&map, &runs, &mut writer);
+    }
+}
+
+/// A file of a laser's program.
+pub fn laser_file(data: &[u8]) {
+    let text = String::from_utf8_lossy(data);
+    if import::renishaw_laser::is_one(&text) {
+        let _ = import::renishaw_laser::cells(&text);
     }
 }
 

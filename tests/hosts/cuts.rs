@@ -15,7 +15,7 @@ use abbe_tests::program::Process;
 use abbe_tests::python::interpreter;
 use serde_json::json;
 
-const WAY: Way = Way {
+pub const WAY: Way = Way {
     delay_s: 2.5e-3,
     jitter_s: 0.5e-3,
     loss: 0.0,
@@ -44,10 +44,10 @@ fn added_m(state: &AxisState) -> f64 {
 }
 
 /// A controller on one host and what compensates it on another, with a model that says the same everywhere.
-struct Cell<'n> {
+pub struct Cell<'n> {
     network: &'n Network,
-    controller: Graph,
-    models: Graph,
+    pub controller: Graph,
+    pub models: Graph,
     voice: Voice,
     nodes: [Process; 2],
     began: Instant,
@@ -55,7 +55,7 @@ struct Cell<'n> {
 
 impl<'n> Cell<'n> {
     /// Starts it, and waits for all of the compensation.
-    fn start(network: &'n Network) -> Self {
+    pub fn start(network: &'n Network) -> Self {
         network.links(Link::even(WAY));
         let scenario = drift::scenario();
         let file = |node: &str| {
@@ -85,7 +85,7 @@ impl<'n> Cell<'n> {
         }
     }
 
-    fn stop(self) {
+    pub fn stop(self) {
         self.voice.stop();
         drop(self.models);
         for node in self.nodes {
@@ -149,7 +149,7 @@ fn cut(cell: &Cell<'_>, lasts: Duration) -> Cut {
 }
 
 /// How long it takes until a peer of the models' host hears the controller, and until the controller hears it, s.
-fn met_in(controller: &Graph, cyclone: &mut Cyclone) -> [f64; 2] {
+pub fn met_in(controller: &Graph, cyclone: &mut Cyclone) -> [f64; 2] {
     let begins = Instant::now();
     let (joints, status) = (topics::JOINT_STATES.name, topics::PLAN_STATUS.name);
     cyclone.samples_within(joints, Duration::ZERO);

@@ -11,4 +11,5 @@
 
 mod contours;
 mod cuts;
+mod named_hosts;
 mod three_hosts;

@@ -18,6 +18,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Message, Wire, from_cdr};
+use abbe_tests::foreseen::Foreseen;
 use linuxcnc_bridge::fault::QUEUE_FAULT;
 use metrology::Axis;
 use metrology::sample::{ProbedPoint, Rejection, TestKind, TestSegment};
@@ -109,6 +110,8 @@ fn run(scenario: &str) -> Option<Finished> {
     let run = std::fs::read_dir(attempt.unwrap()).unwrap().next().unwrap();
     let run = run.unwrap().path();
     assert!(run.join("report.html").is_file());
+    let shipped = root().join("launch_configs").join(scenario);
+    Foreseen::begin(&shipped).agrees(&shipped, &run);
     let bag = Bag::open(run.join("bag")).unwrap();
     let report = std::fs::read_to_string(run.join("report.json")).unwrap();
     let gap = std::fs::read_to_string(run.join("gap.json")).ok();

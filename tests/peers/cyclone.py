@@ -6,6 +6,9 @@ A reader or writer is {"topic", "type", "reliable", "latched", "depth"}, with RO
 standard output, one JSON object a line: `matched` and `sample`, each with its topic and the seconds
 since the participant was made. Commands come on standard input: {"topic", "message"} is written.
 
+With "on_network" it is on every interface, and with "peers", a list of addresses, it looks for those alone and
+without multicast.
+
 A client is {"service", "type"}, as rmw_cyclonedds_cpp maps services onto topics. The command {"service",
 "number", "request"} asks; the event `reply` has service, number and message. `matched` names the
 service when both of its topics have the server. The end of standard input ends the program, after
@@ -38,6 +41,18 @@ LOOPBACK = """<CycloneDDS><Domain><General>
 <Discovery><ParticipantIndex>auto</ParticipantIndex>
 <MaxAutoParticipantIndex>50</MaxAutoParticipantIndex>
 <Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
+
+
+AMONG = """<CycloneDDS><Domain><General><AllowMulticast>false</AllowMulticast></General>
+<Discovery><ParticipantIndex>auto</ParticipantIndex>
+<MaxAutoParticipantIndex>31</MaxAutoParticipantIndex>
+<Peers>{}</Peers></Discovery></Domain></CycloneDDS>"""
+
+
+def configuration(plan: dict) -> str:
+    if "peers" in plan:
+        return AMONG.format("".join(f'<Peer address="{peer}"/>' for peer in plan["peers"]))
+    return "" if plan.get("on_network") else LOOPBACK
 
 
 def quality(end: dict) -> Qos:
@@ -143,7 +158,7 @@ class Server:
 
 def main(plan: dict) -> None:
     types = Types()
-    domain = Domain(plan["domain"], "" if plan.get("on_network") else LOOPBACK)
+    domain = Domain(plan["domain"], configuration(plan))
     participant = DomainParticipant(plan["domain"])
     began = time.monotonic()
     lock = threading.Lock()

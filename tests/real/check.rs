@@ -272,6 +272,8 @@ fn size(check: String, cause: Option<&Value>, parameter: &str, right: &Figure) -
 
 /// What a log goes with: the line `CHANNEL goes with THERMOMETER lagged by N min, S µm/K`, with several terms.
 pub fn follows(wanted: &[Follow], text: &str) -> Vec<Check> {
+    // A person reads a minus sign, which a parser of numbers does not take.
+    let text = text.replace('−', "-");
     let found = |follow: &Follow| -> Option<[f64; 2]> {
         let lines = text.lines().filter(|line| line.contains(" goes with "));
         let start = format!("with {} ", follow.thermometer);

@@ -43,10 +43,15 @@ POSITIONING = {
     "passes_as_runs": ("laser_X.csv", PLAIN),
     "one_way": ("laser_X.csv", PLAIN),
     "one_run": ("laser_X.csv", PLAIN),
+    "one_run_listed": ("laser_X.csv", PLAIN),
     "step_cycle": ("laser_X.csv", PLAIN),
     "rotary_table": ("collimator_C.csv", PLAIN | {"columns": ("direction", "target_deg", "deviation_arcsec")}),
 }
+for name in ("rotary_one_run", "rotary_one_way"):
+    POSITIONING[name] = POSITIONING["rotary_table"]
 WIDE = {"wide_table": ("laser_X.csv", GERMAN)}
+# Recording: a file in the form of Renishaw's laser programs, and its unit of deviations in um or arcsec.
+LASER_FILES = {"laser_file": ("laser.rtl", 1.0), "laser_file_rotary": ("rotary.rta", 648.0 / np.pi)}
 # Recording: table, displacement, column of the run.
 LOGS = {
     "spindle_both": ("spindle.csv", "growth_um", "run"),
@@ -95,6 +100,21 @@ def wide(name, table, form):
     for line in lines:
         at, *cells = (float(cell.replace(form["decimal"], ".")) for cell in line)
         found += [("up" if "↑" in title else "down", at, cell) for title, cell in zip(head[1:], cells)]
+    return found
+
+
+def laser_file(name, table, unit):
+    """Readings of each pass; the side of approach is the way from its first target to its last."""
+    text = (RECORDINGS / name / table).read_text(encoding="utf-8")
+    part = lambda begin, end: text.split(begin)[1].split(end)[0].split()
+    targets = np.array(part("Targets :", "Flags:"), dtype=float)
+    cells = np.array(part("Run Target Data:", "ENVIRONMENT::"), dtype=float).reshape(-1, 3)
+    found = []
+    for run in sorted(set(cells[:, 0])):
+        _, places, values = cells[cells[:, 0] == run].T
+        at = targets[places.astype(int) - 1]
+        side = "up" if at[-1] > at[0] else "down"
+        found += [(side, float(t), unit * v) for t, v in zip(at, values)]
     return found
 
 
@@ -213,6 +233,7 @@ def main():
     folder = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else RECORDINGS
     tests = {name: [positioning(readings(name, *how))] for name, how in POSITIONING.items()}
     tests |= {name: [positioning(wide(name, *how))] for name, how in WIDE.items()}
+    tests |= {name: [positioning(laser_file(name, *how))] for name, how in LASER_FILES.items()}
     tests |= {name: list(logs(name, *how)) for name, how in LOGS.items()}
     tests["slipped_clamp"] = list(circles("slipped_clamp", "ballbar_XY.csv", 100.0))
     for name, figures in tests.items():

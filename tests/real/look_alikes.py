@@ -107,6 +107,8 @@ def forms(folder):
     write_rows(folder, "passes_as_runs", rows, truth, number=lambda k, row: passes[k] + 1)
     write_rows(folder, "one_way", [r for r in rows if r[1] == "up"], truth)
     write_rows(folder, "one_run", [r for r in rows if r[0] == 1], truth)
+    listed = sorted((r for r in rows if r[0] == 1), key=lambda r: (r[2], r[1]))
+    write_rows(folder, "one_run_listed", listed, truth + "; sorted by target, down before up")
     by_target = [r for t in targets for run in range(1, 6) for way in ("up", "down") for r in rows if r[:3] == (run, way, t)]
     write_rows(folder, "step_cycle", by_target, truth + "; each target five times from both sides before the next")
     read = {(r[0], r[1], r[2]): r[3] for r in rows}
@@ -124,7 +126,10 @@ def rotary(folder):
     rows = positioning(rng, targets, lead - lead[0], np.full(12, 8.0), 0.6)
     lines = [f"{r[0]},{r[1]},{r[2]:.0f},{r[3]:.2f}" for r in rows]
     comment = "eccentricity 5 arcsec, second harmonic 2 arcsec, lost motion 8 arcsec, noise 0.6 arcsec"
-    write(folder, "rotary_table", "collimator_C.csv", "run,direction,target_deg,deviation_arcsec", lines, comment)
+    head = "run,direction,target_deg,deviation_arcsec"
+    write(folder, "rotary_table", "collimator_C.csv", head, lines, comment)
+    write(folder, "rotary_one_run", "collimator_C.csv", head, [line for line in lines if line.startswith("1,")], comment)
+    write(folder, "rotary_one_way", "collimator_C.csv", head, [line for line in lines if line.startswith("1,up")], comment)
 
 
 def circles(folder):

@@ -14,6 +14,7 @@ mod kept;
 mod leaps;
 mod lifecycle;
 mod old_bags;
+mod one_wrong;
 mod other_recorders;
 mod out_of_run;
 mod parts;

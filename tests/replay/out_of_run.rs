@@ -12,22 +12,22 @@ use crate::contract::{changed_of, edited};
 use crate::rewrite::{Change, Copied};
 use crate::spoiled::{report, run};
 
-const LENGTH: &str = "/length/position";
+pub const LENGTH: &str = "/length/position";
 const ANGLE: &str = "/angle/position";
-const SEGMENT: &str = "/test/segment";
-const STATE: &str = "/axes/state";
+pub const SEGMENT: &str = "/test/segment";
+pub const STATE: &str = "/axes/state";
 /// Readings of one stop of `tests/import/positioning.csv`: the second of the first run.
 const STOP: std::ops::Range<usize> = 5..10;
 /// Five at each of 15 targets, from both sides, in five runs.
 const READINGS: u64 = 750;
 
 /// The table of a laser along X as a bag.
-fn imported() -> TempDir {
+pub fn imported() -> TempDir {
     imported_of("positioning", "gap_first")
 }
 
 /// A table of `tests/import` as a bag of a machine of `launch_configs`.
-fn imported_of(table: &str, machine: &str) -> TempDir {
+pub fn imported_of(table: &str, machine: &str) -> TempDir {
     let home = tempfile::tempdir().unwrap();
     let [table, map, machine] = [
         format!("tests/import/{table}.csv"),
@@ -50,7 +50,7 @@ fn imported_of(table: &str, machine: &str) -> TempDir {
     home
 }
 
-fn changed(home: &TempDir, change: &dyn Fn(&mut Vec<Copied>)) -> TempDir {
+pub fn changed(home: &TempDir, change: &dyn Fn(&mut Vec<Copied>)) -> TempDir {
     changed_of(
         &home.path().join("bag"),
         &Change {
@@ -61,7 +61,7 @@ fn changed(home: &TempDir, change: &dyn Fn(&mut Vec<Copied>)) -> TempDir {
 }
 
 /// Places of a topic's messages among all.
-fn places(messages: &[Copied], topic: &str) -> Vec<usize> {
+pub fn places(messages: &[Copied], topic: &str) -> Vec<usize> {
     let all = messages.iter().enumerate();
     all.filter(|(_, message)| message.topic == topic)
         .map(|(place, _)| place)
@@ -89,7 +89,7 @@ fn row(json: &Value, topic: &str) -> Value {
     rows.next().cloned().unwrap()
 }
 
-fn told(json: &Value, topic: &str) -> (String, u64) {
+pub fn told(json: &Value, topic: &str) -> (String, u64) {
     let left_out = json["loss"]["left_out"].as_array().unwrap();
     let mut of_topic = left_out.iter().filter(|it| it["topic"] == topic);
     let one = of_topic.next().unwrap_or_else(|| panic!("{left_out:#?}"));
@@ -100,8 +100,9 @@ fn told(json: &Value, topic: &str) -> (String, u64) {
 
 /// Ways in which a reading does not belong to its run, and the reason in the account.
 type Strange = (&'static str, fn(&mut LengthSample), &'static str);
-const STRANGE: [Strange; 7] = [
+const STRANGE: [Strange; 8] = [
     ("axis", |it| it.axis = "Y".to_owned(), "other_axis"),
+    ("zero", |it| it.zero_id += 1, "other_zero"),
     (
         "2033",
         |it| it.header.stamp.sec = 2_000_000_000,
@@ -160,7 +161,7 @@ fn readings_of_a_clock_that_is_an_hour_off_are_all_left_out() {
     assert_eq!(found.code, 3, "{}", found.said);
     let wanted = ("other_time".to_owned(), READINGS);
     assert_eq!(told(&found.json, LENGTH), wanted);
-    let words = "its stamps are 3600 s from those of the other topics, later";
+    let words = "its stamps are 60 min later than those of the other topics";
     assert!(found.said.contains(words), "{}", found.said);
     assert!(found.json["tests"][0]["iso230_2"].is_null());
 }

@@ -67,6 +67,9 @@ fn replay_needs_what_was_before_the_middle() {
         code, 1,
         "nodes that had forgotten all said the same: {outcome:#}"
     );
-    let beyond = ["--resume-after", "100000000"].map(str::to_owned);
-    assert_eq!(check_with(short_run(), &beyond).0, 1);
+    // Behind the last message, and behind the last input.
+    for after in [100_000_000, messages(short_run()) - 1] {
+        let beyond = ["--resume-after".to_owned(), after.to_string()];
+        assert_eq!(check_with(short_run(), &beyond).0, 1, "{after}");
+    }
 }

@@ -140,7 +140,7 @@ fn topics_whose_stamps_are_all_two_hours_off_are_named_by_report_and_diagnosis()
             },
         );
         let bag = bag.path().display().to_string();
-        let words = "its stamps are 7200 s from those of the other topics, later";
+        let words = "its stamps are 2.0 h later than those of the other topics";
         for verb in verbs {
             let (code, said) = run(&[verb, &bag]);
             assert!(said.contains(words), "{verb} {prefix}: {said}");

@@ -89,6 +89,37 @@ fn check_location_errors(report: &Value, plant: &Value) {
     assert!(covered >= 7, "{covered} of 8 intervals hold the truth");
 }
 
+/// ISO 230-10 of the 25 touches on one sphere, with U, and the certificate: the plant's sphere is round, so that P_FTU,3D is what
+/// the probe scatters (0.3 µm) and what its pretravel has of three lobes.
+fn check_probing(report: &Value, run: &std::path::Path) {
+    let tests = report["tests"].as_array().unwrap();
+    let errors = { tests.iter() }.find_map(|test| test["iso230_10_errors"].as_array());
+    let errors = errors.unwrap_or_else(|| panic!("no ISO 230-10: {tests:?}"));
+    let whole = errors.iter().filter(|one| one["points"] == 25);
+    let whole: Vec<&Value> = whole.collect();
+    assert_eq!(whole.len(), 1, "{whole:?}");
+    let form = &whole[0]["probing_error"];
+    let (um, u_um) = (
+        1e3 * number(form, "value_mm"),
+        1e3 * number(form, "expanded_uncertainty_mm"),
+    );
+    eprintln!("P_FTU,3D {um:.2} um, U {u_um:.2} um");
+    assert!(
+        um > 0.3 && um < 6.0 && u_um > 0.05 && u_um < 2.0,
+        "{um} {u_um}"
+    );
+    let page = std::fs::read_to_string(run.join("report.html")).unwrap();
+    for words in [
+        "<dt>Touch probe</dt><dd>simulated touch probe, ruby of 6 mm; serial number none, simulated; certificate none, simulated",
+        "<dt>Artefact high</dt><dd>certificate simulated sphere</dd>",
+        "<dt>Operator</dt><dd>none, simulated</dd>",
+        "simulated sphere: diameter 25.0000 mm ± 0.30 µm",
+        "60, 120, 240, 480 mm/min",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
+}
+
 #[test]
 fn scenario_five_axis_tool_error_is_reduced_tenfold() {
     let began = Instant::now();
@@ -125,6 +156,7 @@ fn scenario_five_axis_tool_error_is_reduced_tenfold() {
     // In the motors' readings the sphere is where it was, compensated or not, but for a little heat.
     assert!((after_um[0] - after_um[1]).abs() < 2.0, "{after_um:?}");
     check_touches_along(&report);
+    check_probing(&report, &run);
     // What is expected has reversal errors, error motions and linear axes in it: no verification leaves twice as much.
     let expected_um = said(&report, "verified", "expected_um");
     let noise_um = said(&report, "verified", "noise_alone_um");

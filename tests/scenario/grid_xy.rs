@@ -49,6 +49,24 @@ fn near(what: &str, found_um: f64, as_read_um: f64, expansion_um: f64) {
     );
 }
 
+/// The table of checked figures has what numpy finds now.
+fn check_document(pairs: &[Value]) {
+    let document = include_str!("../../docs/reference/checked-figures.md");
+    let turn = |pair: usize| &pairs[pair]["marked_turn"];
+    for (row, mm) in [
+        (
+            "| G counter-clockwise, `grid_xy` runs 5 and 6 |",
+            &turn(0)["counter_clockwise"]["g"],
+        ),
+        ("| H of the same |", &turn(0)["h"]),
+        ("| H at 6000 mm/min, runs 9 and 10, both", &turn(2)["h"]),
+    ] {
+        let line = document.lines().find(|line| line.starts_with(row)).unwrap();
+        let um = format!("| {:.4} µm |", 1e3 * mm.as_f64().unwrap());
+        assert!(line.contains(&um), "{row} {um} {line}");
+    }
+}
+
 /// ISO 230-4 of the page against numpy on the raw readings of the bag, and the faults that it would have.
 fn check_circles(bag: &Path, parts: &[Value]) {
     let Some(python) = interpreter("grid_xy: circles by numpy") else {
@@ -106,6 +124,7 @@ fn check_circles(bag: &Path, parts: &[Value]) {
             "{apart_um}"
         );
     }
+    check_document(&pairs);
     // The run-in of run 6 shows: without leaving it out, H would be 2 µm more.
     let h_um = |key: &str| um(&pairs[0][key]["h"]);
     assert!(h_um("with_run_in") - h_um("marked_turn") > 2.0, "{pairs:?}");

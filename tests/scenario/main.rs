@@ -7,12 +7,16 @@
 )]
 #![expect(clippy::print_stderr, reason = "figures that were seen are said")]
 
+#[path = "../../nodes/libraries/history/tests/postgres/authority.rs"]
+#[expect(dead_code, reason = "the tests of the history use the rest")]
+mod authority;
 mod bad_plan;
 mod blocks;
 mod cell;
 mod design;
 mod diagonals;
 mod five_axis;
+mod fleet_board;
 mod gap_bad_bags;
 mod gap_first;
 mod gap_import;
@@ -31,6 +35,9 @@ mod odd_files;
 mod odd_logs;
 mod page;
 mod positioning;
+#[path = "../../nodes/libraries/history/tests/postgres/server.rs"]
+#[expect(dead_code, reason = "the tests of the history use the rest")]
+mod postgres;
 mod preflight;
 mod probe_faults;
 mod real_shift;

@@ -33,8 +33,10 @@ pub fn sentence<'t>(text: &'t str, begin: &str) -> &'t str {
 
 /// The numbers after `mark`, as many as are wanted.
 pub fn numbers_after<const N: usize>(text: &str, mark: &str) -> [f64; N] {
+    // A person reads a minus sign, which a parser of numbers does not take.
+    let (text, mark) = (&text.replace('−', "-"), &mark.replace('−', "-"));
     let place = text
-        .find(mark)
+        .find(mark.as_str())
         .unwrap_or_else(|| panic!("no {mark:?} in {text:?}"));
     let is_of_number = |c: char| c.is_ascii_digit() || c == '.' || c == '-';
     let mut words = text[place + mark.len()..]

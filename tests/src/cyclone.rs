@@ -69,6 +69,23 @@ impl Cyclone {
         Self::start_with(python, &plan)
     }
 
+    /// Starts it on every interface without multicast; it looks for hosts at `peers` alone.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    #[must_use]
+    pub fn among(
+        python: &PathBuf,
+        domain: u16,
+        peers: &[&str],
+        readers: &[Value],
+        writers: &[Value],
+    ) -> Self {
+        let plan =
+            json!({"domain": domain, "peers": peers, "readers": readers, "writers": writers});
+        Self::start_with(python, &plan)
+    }
+
     /// Starts it with clients of services, each by absolute name and type, `package/srv/Name`.
     ///
     /// # Panics

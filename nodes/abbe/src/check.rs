@@ -9,7 +9,7 @@ use clap::Args;
 use comfy_table::Table;
 use comfy_table::presets::NOTHING;
 use metrology::bound::Bound;
-use metrology::stamp::NANOS_PER_S;
+use metrology::epoch::utc_of_nanos;
 use metrology::text::{self, Comments};
 use node_runtime::arguments::Arguments;
 use node_runtime::{Node, Setup};
@@ -194,10 +194,9 @@ fn listed(not_in_bag: &BTreeMap<String, NotInBag>) -> String {
 }
 
 fn in_words(difference: &Difference) -> String {
-    let seconds = difference.at_nanos.div_euclid(NANOS_PER_S);
-    let nanos = difference.at_nanos.rem_euclid(NANOS_PER_S);
+    let at = utc_of_nanos(difference.at_nanos, 9);
     let place = format!(
-        "on {}, message {}, at {seconds}.{nanos:09} s",
+        "on {}, message {}, at {at}",
         difference.topic, difference.message
     );
     match &difference.discrepancy {

@@ -1,4 +1,4 @@
-//! `abbe diagnose BAG...`: where simulator and machine differ, which effect causes it, how far it shrinks.
+//! `abbe diagnose BAG...`, or tables: where simulator and machine differ, which effect causes it, how far it shrinks.
 
 use node_runtime::complain;
 use node_runtime::text_file;
@@ -19,7 +19,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use gap_diagnosis::{GapConfig, Rule, diagnose};
+use gap_diagnosis::{GapConfig, OWN_TIME, Rule, diagnose};
 use machine::MachineFile;
 use recorder::Bag;
 use sha2::{Digest, Sha256};
@@ -34,19 +34,24 @@ use crate::tell::tell;
 
 pub mod bags;
 mod machine_text;
+mod opened;
 mod second_round;
 pub mod simulated;
 
 use bags::Recorded;
+use opened::Opened;
 use second_round::Round;
 use simulated::Beside;
 
 /// Arguments of `abbe diagnose`.
 #[derive(Args)]
 pub struct Diagnose {
-    /// Folders of the bags, in the order of their recording.
+    /// Folders of the bags, in the order of their recording; tables too, with --machine.
     #[arg(required = true)]
     bags: Vec<PathBuf>,
+    /// Map of the tables among them; without it their columns are recognised.
+    #[arg(long)]
+    map: Option<PathBuf>,
     /// Machine file that the simulator runs on; without it the one in the first bag.
     #[arg(long)]
     machine: Option<PathBuf>,
@@ -112,13 +117,7 @@ impl Diagnose {
     /// When a bag or the machine file cannot be read, nothing was repeated, or the bag is another machine's.
     pub fn execute(self) -> Result<ExitCode> {
         self.refuse_outputs()?;
-        let (name, text) = match &self.machine {
-            Some(path) => {
-                let file = text_file::yaml_file(path).context("machine file")?;
-                (file.path.display().to_string(), file.text)
-            }
-            None => bags::machine_text(&self.bags[0])?,
-        };
+        let (opened, (name, text)) = self.opened()?;
         let round = self.round(&name, &text)?;
         let config = GapConfig {
             left_out: self.without.clone(),
@@ -127,17 +126,22 @@ impl Diagnose {
         };
         let budget = self.budget.as_deref().map(Budget::open).transpose()?;
         let limits = self.limits.open()?;
-        let diagnosed = beside(&self.bags, &self.simulated, &name, &text, &config)?;
+        let mut diagnosed = beside(&opened.bags, &self.simulated, &name, &text, &config)?;
+        opened.name_as_given(&mut diagnosed.diagnosis.report, &self.bags);
         let machine = MachineFile::parse(&text, &name)?.name;
         let title = format!("Simulator against machine: {machine}");
         let mut page = gap::page(&title, &diagnosed, self.explain)?;
         let mut between = None;
-        for path in &self.bags {
+        for path in &opened.bags {
             let seen = TestConditions::of(&Bag::open(path)?);
             page.add_conditions(&test_conditions::of(&seen, budget.as_ref(), None));
             between = joined(between, seen.nanos());
         }
-        let first = Bag::open(&self.bags[0])?;
+        if opened.has_tables() {
+            page.begin_with_table(&opened.lines());
+            page.state_shortcomings(None, opened.warnings());
+        }
+        let first = Bag::open(&opened.bags[0])?;
         page.screen.made = Some(Made::of(
             SOFTWARE,
             &first,
@@ -164,9 +168,28 @@ impl Diagnose {
         for remark in diagnosed.losses().iter().chain(&diagnosed.remarks) {
             complain!("abbe: {remark}");
         }
-        let kept = self.print_and_keep(&page, &diagnosed, machine);
-        let code = loss::exit_code(diagnosed.losses().is_empty());
+        let kept = self.print_and_keep(&page, &diagnosed, (&opened, machine));
+        let code = loss::exit_code(diagnosed.losses().is_empty() && opened.is_whole());
         alarms::ended(alarms.as_ref(), kept, code)
+    }
+
+    /// The bags to read, and name and text of the machine file.
+    fn opened(&self) -> Result<(Opened, (String, String))> {
+        let stated = match &self.machine {
+            Some(path) => {
+                let file = text_file::yaml_file(path).context("machine file")?;
+                Some((file.path.display().to_string(), file.text))
+            }
+            None => None,
+        };
+        let named = stated.as_ref();
+        let machine = named.map(|(name, text)| (name.as_str(), text.as_str()));
+        let opened = Opened::of(&self.bags, self.map.as_deref(), machine)?;
+        let machine = match stated {
+            Some(machine) => machine,
+            None => bags::machine_text(&opened.bags[0])?,
+        };
+        Ok((opened, machine))
     }
 
     /// The JSON, and the figures that are kept beside their limits, which are behind page and JSON.
@@ -182,7 +205,7 @@ impl Diagnose {
         let judge = |limits: Limits| self.keep.judge_diagnosis(limits, &json, of);
         let alarms = limits.map(judge).transpose()?;
         if let Some(alarms) = &alarms {
-            page.add("alarms", &alarms.section());
+            alarms.add_to(page);
             json["alarms"] = alarms.json();
         }
         Ok((serde_json::to_string_pretty(&json)?, alarms))
@@ -230,14 +253,23 @@ impl Diagnose {
     }
 
     /// The page as a PDF, and its figures in the history, where that is wanted.
-    fn print_and_keep(&self, page: &Report, diagnosed: &Diagnosed, machine: String) -> Result<()> {
+    fn print_and_keep(
+        &self,
+        page: &Report,
+        diagnosed: &Diagnosed,
+        (opened, machine): (&Opened, String),
+    ) -> Result<()> {
         let conditions = &page.figures["conditions"];
         if let Some(path) = &self.pdf {
             let head = pdf::Head::of(Some(&machine), conditions);
             pdf::write(path, &page.html(), &head)?;
         }
         if self.keep.is_wanted() {
-            let origin = Origin::of_bags(&self.bags, Some(machine))?.with_conditions(conditions);
+            let mut origin = Origin::of_bags(&opened.bags, Some(machine))?;
+            if opened.has_tables() {
+                origin.source = listed(&self.bags);
+            }
+            let origin = origin.with_conditions(conditions);
             self.keep.diagnosis(&diagnosed.json()?, origin)?;
         }
         Ok(())
@@ -257,7 +289,7 @@ impl Diagnose {
             path.map(|path| Output::new(option, path.clone(), form))
         });
         let outputs: Vec<Output> = outputs.collect();
-        let files = [&self.machine, &self.plan, &self.budget];
+        let files = [&self.machine, &self.map, &self.plan, &self.budget];
         let files = files.into_iter().filter_map(|file| file.as_deref());
         let files = files.chain(self.limits.path());
         let bags = self.bags.iter().chain(&self.simulated);
@@ -327,7 +359,8 @@ fn beside(
     let recorded = Recorded::read(paths, &machine)?;
     let beside = simulated::beside(simulated, &machine, &recorded)?;
     let session = beside.as_ref().map_or(&recorded.session, |it| &it.session);
-    let mut diagnosis = diagnose(&machine, session, config)
+    let (config, in_no_order) = without_time(paths, config)?;
+    let mut diagnosis = diagnose(&machine, session, &config)
         .map_err(|error| bags::not_whole(error.into(), &loss::lines(&recorded.readings)))?;
     diagnosis.report.inputs.bags = recorded.bags;
     diagnosis.report.inputs.machine_sha256 = format!("{:x}", Sha256::digest(machine_text));
@@ -338,20 +371,46 @@ fn beside(
     let (simulated, of_simulator) = beside.map_or((None, vec![]), |it: Beside| {
         (Some(it.simulated), it.remarks)
     });
-    let remarks = recorded.remarks.into_iter().chain(leaps);
+    let remarks = in_no_order.into_iter().chain(recorded.remarks).chain(leaps);
     Ok(Diagnosed {
         diagnosis,
+        omitted: recorded.omitted,
         remarks: remarks.chain(of_simulator).collect(),
         readings: recorded.readings,
         defaults,
         simulated,
-        without: config.left_out.clone(),
+        without: config.left_out,
         ablated: config
             .ablated
             .iter()
             .map(|rule| rule.id().to_owned())
             .collect(),
     })
+}
+
+/// The settings without what goes with time, and a remark, where a bag's table was not in the order of the measurement.
+fn without_time(paths: &[PathBuf], config: &GapConfig) -> Result<(GapConfig, Option<String>)> {
+    let mut config = config.clone();
+    let mut unknown = vec![];
+    for path in paths {
+        if bags::is_in_no_order(path)? {
+            unknown.push(path.clone());
+        }
+    }
+    if unknown.is_empty() {
+        return Ok((config, None));
+    }
+    let own_time = OWN_TIME.iter().filter(|id| effect(id).is_ok());
+    for id in own_time {
+        if !config.left_out.iter().any(|known| known == id) {
+            config.left_out.push((*id).to_owned());
+        }
+    }
+    let remark = format!(
+        "{}: the table's rows were not in the order of the measurement, so nothing that goes with time or temperature is judged",
+        listed(&unknown)
+    );
+    Ok((config, Some(remark)))
 }
 
 /// The diagnosis of a run's own bag as a part of its page, for `explain` as [`gap::page`] has it; without one, why.

@@ -1,6 +1,6 @@
 //! `abbe import CSV --map MAP -o BAG`: somebody's measurement as a bag that `abbe diagnose` reads.
 //!
-//! A CSV holds what an instrument read; the map says which column is what and how the machine moved. The motion is
+//! A table holds what an instrument read; the map says which column is what and how the machine moved. The motion is
 //! made up from it: rests at the targets of a positioning test, approached as the order of the rows says; an even feed
 //! round a circle, a quarter of a turn ahead of its first row; standing axes for a log. Motors were not recorded and
 //! say nothing: they are written as commanded, which a diagnosis notices and leaves out.
@@ -22,26 +22,37 @@ mod again;
 mod angles;
 mod beside;
 mod book;
+mod clock_parts;
 mod dates;
 mod file;
+mod hidden;
+mod instrument;
+mod laser_conditions;
 pub(crate) mod limits;
+mod listed;
 pub(crate) mod map;
 mod map_schema;
 mod measured;
 mod motion;
 mod odd;
 mod parted;
+mod pass_names;
 mod passes;
 pub(crate) mod propose;
+mod quantities;
 mod recognise;
+mod renishaw_laser;
+mod returns;
 mod runs;
 mod same;
 mod separators;
 mod sheet;
 mod stated;
+mod statement;
 mod table;
 mod times;
 mod units;
+mod unread;
 mod vocabulary;
 mod writer;
 
@@ -56,7 +67,7 @@ use crate::tell::tell;
 /// Arguments of `abbe import`.
 #[derive(Args)]
 pub struct Import {
-    /// Table of readings: text, or a worksheet (xlsx).
+    /// Table of readings: text, a worksheet (xlsx), or a file of an instrument (Renishaw rtl, rta).
     csv: PathBuf,
     /// Which column is what, and how the machine moved.
     #[arg(long, required_unless_present = "propose")]
@@ -85,6 +96,11 @@ impl Import {
         }
     }
 }
+
+/// Attachment of a bag with what its table states.
+pub const ATTACHMENT: &str = "params/import.yaml";
+/// Line of it where the rows were not in the order of the measurement.
+pub const ORDER_UNKNOWN: &str = "order: unknown";
 
 /// A text with the name of its file, which messages quote.
 pub(crate) struct Named {
@@ -129,7 +145,7 @@ impl Import {
         };
         let map = Named::read(map, "map")?;
         let machine = Named::read(machine, "machine file")?;
-        let imported = import(&self.csv, &map, machine, output)?;
+        let imported = import(&self.csv, (&map, &[]), machine, output)?;
         tell!(
             "{}: {} runs, {} messages",
             output.display(),
@@ -160,11 +176,16 @@ impl Import {
     }
 }
 
-/// Writes the bag of a table.
+/// Writes the bag of a table; `assumed`: keys of the map whose values nobody stated.
 ///
 /// # Errors
 /// As [`Import::execute`].
-pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -> Result<Imported> {
+pub(crate) fn import(
+    csv: &Path,
+    (named, assumed): (&Named, &[String]),
+    machine: Named,
+    output: &Path,
+) -> Result<Imported> {
     let in_map = |error: &dyn std::fmt::Display| {
         let said = yaml::placed(&named.place, &named.text, &error.to_string());
         anyhow!("map {said}")
@@ -188,21 +209,26 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
     let mut runs = runs::of(&map.test, &table).with_context(in_table)?;
     let remarks = plausible(&map.test, &machine, &runs).with_context(in_table)?;
     runs.remarks.extend(remarks);
-    let stated = map.resolution();
-    let stated = stated.map(|(key, value)| format!("{key}: {value:?}\n"));
     let of_machine = (&machine, machine_text);
     if output.exists() {
         let path = output.to_owned();
         return Err(RecorderError::Exists { path }.into());
     }
     let folder = WholeFolder::begin(output)?;
-    let mut writer = Writer::begin(folder.path(), of_machine, map.start_s, stated)?;
+    let mut writer = Writer::begin(
+        folder.path(),
+        of_machine,
+        map.start_s,
+        Some(stated(&map, assumed, &runs)),
+    )?;
     let n_runs = motion::write(&map, &runs, &mut writer).with_context(in_table)?;
     let written = writer.finish()?;
     folder.finish()?;
     let mut notes = doubts(&map, &runs);
     notes.extend(written.in_words());
+    notes.extend(cells.form.map(|form| format!("a {form}")));
     notes.extend(cells.note);
+    notes.extend(cells.remarks);
     notes.extend(table.left_out);
     let n_odd = table.odd.len();
     let n_rows = runs.runs.iter().map(Vec::len).sum();
@@ -214,6 +240,25 @@ pub(crate) fn import(csv: &Path, named: &Named, machine: Named, output: &Path) -
         n_odd,
         notes,
     })
+}
+
+/// Whether a file is of an instrument's own form, by its content; one that cannot be read is of none.
+pub(crate) fn is_of_instrument(path: &Path) -> bool {
+    let bytes = path
+        .is_file()
+        .then(|| text_file::bytes(path).ok())
+        .flatten();
+    bytes.is_some_and(|bytes| instrument::of(&bytes).is_some())
+}
+
+/// What a bag carries of a table beside its readings, as YAML.
+fn stated(map: &Map, assumed: &[String], runs: &Runs) -> String {
+    let mut stated = map.statement(assumed);
+    if !runs.is_order_known {
+        stated.push_str(ORDER_UNKNOWN);
+        stated.push('\n');
+    }
+    stated
 }
 
 /// Refuses targets beyond the travel; gives remarks about readings that the test cannot have.

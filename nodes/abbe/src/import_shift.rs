@@ -117,6 +117,13 @@ impl OrderFile {
                 "{key} = {time_s} s: must be from 1 to 86400 s"
             );
         }
+        let lines = self.slice_s / self.bin_s;
+        ensure!(
+            lines >= 1.0 && (lines - lines.round()).abs() < 1e-9,
+            "slice_s = {} s: must be a whole multiple of bin_s, {} s",
+            self.slice_s,
+            self.bin_s
+        );
         self.bounded((to - from).as_secs_f64())?;
         let windows = [self.x_mm, self.y_mm, self.z_mm];
         let mut feed_limit_mm_min = f64::INFINITY;
@@ -213,6 +220,7 @@ impl ImportShift {
         write(&self.output, &programs)?;
         tell!("{}: {} programs", self.output.display(), programs.len());
         self.account(&shift, &order);
+        self.warn_of_silence(&shift);
         self.warn_of_speeds(&shift);
         Ok(loss::exit_code(shift.is_whole))
     }
@@ -231,6 +239,33 @@ impl ImportShift {
         let more = shift.doubtful.len().saturating_sub(SPEEDS_SHOWN);
         if more > 0 {
             complain!("{log}: warning: and {more} more such readings");
+        }
+    }
+
+    /// Times of which the log says nothing: what it said last holds in the programs.
+    fn warn_of_silence(&self, shift: &Shift) {
+        let log = self.log.display();
+        let named = |spans: &[(Stamp<Machine>, Stamp<Machine>)]| {
+            let more = spans.len().saturating_sub(LEAPS_SHOWN);
+            let shown: Vec<String> = spans.iter().take(LEAPS_SHOWN).map(between).collect();
+            let more = if more > 0 {
+                format!(", and {more} more")
+            } else {
+                String::new()
+            };
+            shown.join(", ") + &more
+        };
+        if !shift.silent.is_empty() {
+            let spans = named(&shift.silent);
+            complain!(
+                "{log}: warning: no line from {spans}: what was logged last holds there, and axes rest"
+            );
+        }
+        if !shift.without_spindle.is_empty() && !shift.is_whole {
+            let spans = named(&shift.without_spindle);
+            complain!(
+                "{log}: no speed of the spindle from {spans}: it stands there in the programs"
+            );
         }
     }
 

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use metrology::epoch::utc_of_nanos;
 use node_runtime::arguments::Arguments;
 use node_runtime::complain;
 use node_runtime::environment::Environment;
@@ -181,8 +182,8 @@ impl Shown {
             return;
         };
         let state = if progress.paused { "paused at" } else { "at" };
-        let at_s = progress.at.as_secs_f64();
-        bar.set_message(format!("{state} {at_s:.3} s, {} messages", progress.sent));
+        let at = utc_of_nanos(progress.at.nanos(), 3);
+        bar.set_message(format!("{state} {at}, {} messages", progress.sent));
         bar.tick();
     }
 

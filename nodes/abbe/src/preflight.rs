@@ -12,8 +12,10 @@ use gap_diagnosis::GapConfig;
 use gap_diagnosis::preflight::preflight;
 use metrology::bound::{Bound, BoundError};
 use metrology::number::number;
+use metrology::stamp::NANOS_PER_S;
 use nalgebra::Vector3;
 use reports::gap::planned;
+use reports::screen::Made;
 use reports::section::Section;
 use reports::terminal::{self, Part, Room};
 use reports::whole_file::{self, Form, Output, check_outputs};
@@ -36,6 +38,7 @@ use outcome::Seen;
 use programme::{Planned, Programme};
 use wanted::Proposal;
 
+use crate::SOFTWARE;
 use crate::tell::tell;
 use crate::usage::{GREATEST_NUMBER, refused};
 
@@ -157,7 +160,8 @@ impl Preflight {
         let plan = Planned::read(what, self.machine.as_deref())?;
         size::check(&plan.plan, &plan.programs, &plan.machine)?;
         let geometry = self.geometry(&plan, u_um * 1e-3)?;
-        let page = self.foreseen(&plan)?;
+        let mut page = self.foreseen(&plan)?;
+        page.screen.made = Some(foreseen_now(&plan.machine.name, plan.what()));
         let title = format!("Preflight: {}", plan.plan.title);
         if let Some(path) = &self.html {
             let sections = geometry.sections();
@@ -259,6 +263,12 @@ impl Preflight {
             .collect::<Result<Vec<_>>>()?;
         Ok(Geometry(Some((programme, seen, proposals))))
     }
+}
+
+/// Machine, plan, time and software of a page on which nothing was measured.
+pub(crate) fn foreseen_now(machine: &str, plan: &str) -> Made {
+    let now_nanos = chrono::Utc::now().timestamp().saturating_mul(NANOS_PER_S);
+    Made::of_plan(SOFTWARE, machine, plan, now_nanos)
 }
 
 /// What the recordings over a plate will determine, where there are any.

@@ -4,7 +4,7 @@ use node_runtime::complain;
 use node_runtime::text_file;
 use reports::evaluate::budget::{Budget, unstate};
 use reports::evaluate::limits::{Limits, state_traceability};
-use reports::evaluate::{BrokenOff, Tests};
+use reports::evaluate::{BrokenOff, NotEvaluated, Tests};
 use reports::loss;
 use reports::machine_defaults;
 use reports::page::fold_details;
@@ -32,7 +32,7 @@ use crate::pdf;
 use crate::tell::tell;
 
 mod first_screen;
-mod from_table;
+pub mod from_table;
 
 /// Arguments of `abbe report`.
 #[derive(Args)]
@@ -42,7 +42,7 @@ pub struct ReportBag {
     /// Which column of the table is what, as `abbe import` takes it.
     #[arg(long)]
     map: Option<PathBuf>,
-    /// What is not known about the measurements: the expanded uncertainties of ISO 230-2, -4 and -6 come from it and are not
+    /// What is not known about the measurements: the expanded uncertainties of ISO 230-2, 230-4 and 230-6 come from it and are not
     /// stated without it. What fits say of themselves (geometric errors, causes of circles) is stated in any case.
     #[arg(long)]
     budget: Option<PathBuf>,
@@ -72,14 +72,12 @@ fn complain_of(tests: &Tests) {
     for run in &tests.broken_off {
         complain!("abbe: {run}");
     }
+    for run in &tests.not_evaluated {
+        complain!("abbe: {run}");
+    }
     for run in reports::circular::refused(&tests.circles) {
         complain!("abbe: not evaluated: {run}");
     }
-}
-
-/// Whether nothing was lost or left out, and every circle could be evaluated.
-fn is_whole(tests: &Tests) -> bool {
-    tests.reading.is_whole() && reports::circular::refused(&tests.circles).is_empty()
 }
 
 /// Nothing is known of the machine of a table; a map states where it was measured.
@@ -158,7 +156,7 @@ impl ReportBag {
             &tests,
             table.as_ref().map(|table| table.bag.as_path()),
         );
-        let code = loss::exit_code(is_whole(&tests) && n_odd == 0);
+        let code = loss::exit_code(tests.is_whole() && n_odd == 0);
         alarms::ended(alarms.as_ref(), kept, code)
     }
 
@@ -179,7 +177,7 @@ impl ReportBag {
         };
         let of = (machine, tests.conditions.nanos(), self.bag.as_path());
         let alarms = self.keep.judge_report(limits, &report.figures, of)?;
-        report.add("alarms", &alarms.section());
+        alarms.add_to(&mut report);
         Ok((report, Some(alarms)))
     }
 
@@ -266,12 +264,21 @@ fn judged_page(
     budget: Option<&Budget>,
     limits: Option<&Limits>,
 ) -> Result<Report> {
+    budget.map_or(Ok(()), |budget| budget.check_tests(tests))?;
     let conditions = reports::test_conditions::of(&tests.conditions, budget, Some(tests));
     let defaults = machine_defaults::of_tests(tests);
     let defaults_line = machine_defaults::in_words(&defaults);
     let mut sections = sections(tests, budget)?;
     let mut lines = loss::in_words(&tests.reading);
     lines.extend(tests.broken_off.iter().map(ToString::to_string));
+    let n = tests.not_evaluated.len();
+    if n > 0 {
+        lines.push(format!(
+            "NOT WHOLE: runs that were measured and are not evaluated: {n}."
+        ));
+    }
+    lines.extend(tests.not_evaluated.iter().map(ToString::to_string));
+    let is_bad = n > 0 || !tests.reading.is_whole();
     if sections.is_empty() {
         lines.push("The bag holds no test that can be evaluated.".to_owned());
     }
@@ -293,6 +300,7 @@ fn judged_page(
         title: title.to_owned(),
         screen: Screen {
             behind: vec![conditions.section.html()],
+            conditions: conditions.facts.clone(),
             ..screen
         },
         parts: terminal::apart(
@@ -300,7 +308,7 @@ fn judged_page(
                 .chain(sections.iter().map(Part::of)),
         ),
         body: html! {
-            @for line in &lines { p.bad[!tests.reading.is_whole()] { (line) } }
+            @for line in &lines { p.bad[is_bad] { (line) } }
             @if let Some(line) = &defaults_line { p { (line) } }
             @for section in &ordered { (section.html()) }
             @if details.len() > MOST_DETAILS {
@@ -320,6 +328,7 @@ fn judged_page(
             "conditions": conditions.section.figures,
             "machine_defaults": defaults,
             "not_completed": not_completed(&tests.broken_off),
+            "not_evaluated": not_evaluated(&tests.not_evaluated),
             "tests": figures,
             "conformance": conformance,
         }),
@@ -344,13 +353,19 @@ fn not_completed(runs: &[BrokenOff]) -> serde_json::Value {
     runs.iter().map(row).collect()
 }
 
+/// The runs that were measured and have no figure, for machines.
+fn not_evaluated(runs: &[NotEvaluated]) -> serde_json::Value {
+    let row = |it: &NotEvaluated| serde_json::json!({ "run": it.run, "test": it.test, "reason": it.reason });
+    runs.iter().map(row).collect()
+}
+
 fn uncertainty(stated: bool) -> serde_json::Value {
     if stated {
         serde_json::json!({ "stated": true })
     } else {
         serde_json::json!({
             "stated": false,
-            "reason": "no budget was given (--budget): the expanded uncertainties of ISO 230-2, -4 and -6 are null; standard uncertainties are those of fits, which need none",
+            "reason": "no budget was given (--budget): the expanded uncertainties of ISO 230-2, 230-4 and 230-6 are null; standard uncertainties are those of fits, which need none",
         })
     }
 }
@@ -359,7 +374,10 @@ fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> {
     let mut sections = reports::positioning::sections(tests, budget)?;
     sections.extend(reports::periodic::section(tests, budget));
     sections.extend(reports::angular::sections(tests, budget)?);
-    sections.extend(reports::stops::section(&tests.stops));
+    sections.extend(reports::stops::section(
+        &tests.stops,
+        tests.machine.as_ref(),
+    ));
     sections.extend(reports::geometry::tables(&tests.tables));
     sections.extend(reports::circular::sections(
         &tests.circles,
@@ -456,7 +474,7 @@ mod tests {
         assert_eq!(report.figures["uncertainty"]["stated"], false);
         let reason = report.figures["uncertainty"]["reason"].as_str().unwrap();
         assert!(reason.contains("--budget"), "{reason}");
-        assert!(reason.contains("ISO 230-2, -4 and -6"), "{reason}");
+        assert!(reason.contains("ISO 230-2, 230-4 and 230-6"), "{reason}");
         assert!(reason.contains("those of fits"), "{reason}");
     }
 }

@@ -18,6 +18,7 @@ use reports::evaluate::test_conditions::TestConditions;
 use reports::evidence::Evidence;
 use reports::loss;
 use reports::page::fold;
+use reports::probing;
 use reports::screen::Made;
 use reports::section::Section;
 use reports::terminal::{MOST_LINES, Room};
@@ -40,6 +41,7 @@ mod live;
 mod mirror;
 mod serve;
 mod shortcomings;
+mod simulated_latency;
 mod table_trial;
 mod unwritten;
 
@@ -230,6 +232,7 @@ impl Run {
             complain!("abbe: the end was forced: no page was written");
             return Ok(ExitCode::FAILURE);
         }
+        simulated_latency::state(&mut outcome.evidence, scenario);
         let title = format!("{}: {}", scenario.name, scenario.file.title);
         let mut report = Report::of(scenario.file.report, &title, &outcome.evidence)?;
         let mut between = None;
@@ -238,6 +241,8 @@ impl Run {
             let tests = Tests::of(&Bag::open(&bag)?);
             between = tests.conditions.nanos();
             report.join(report_bag::page("", &tests, scenario.budget()?.as_ref())?);
+        } else if scenario.file.report == ReportKind::Rotary && outcome.recorded > 0 {
+            between = add_probing(&mut report, scenario, &Bag::open(&bag)?)?;
         } else if outcome.recorded > 0 {
             let seen = TestConditions::of(&Bag::open(&bag)?);
             between = seen.nanos();
@@ -317,7 +322,7 @@ impl Run {
         let machine = Origin::of_run(bag, &scenario.folder.join("machine.yaml"))?.machine;
         let of = (machine.as_deref(), between, bag);
         let alarms = self.keep.judge_report(limits, &report.figures, of)?;
-        report.add("alarms", &alarms.section());
+        alarms.add_to(report);
         Ok(Some(alarms))
     }
 
@@ -421,7 +426,7 @@ impl Outcome {
     fn end(self) -> ExitCode {
         let shortcomings = self.shortcomings();
         if !shortcomings.is_empty() {
-            complain!("abbe: what did not go as told:");
+            complain!("abbe: what did not go as planned:");
         }
         for line in &shortcomings {
             complain!("abbe:   {line}");
@@ -439,6 +444,23 @@ impl Outcome {
             }
         }
     }
+}
+
+/// Adds what ISO 230-10 says of the touches, with the conditions; gives begin and end of the tests.
+fn add_probing(report: &mut Report, scenario: &Scenario, bag: &Bag) -> Result<Option<(i64, i64)>> {
+    let tests = Tests::of(bag);
+    let budget = scenario.budget()?;
+    budget
+        .as_ref()
+        .map_or(Ok(()), |budget| budget.check_tests(&tests))?;
+    let sections = probing::sections(&tests, budget.as_ref());
+    report.add_tests(&sections, budget.is_some());
+    report.add_conditions(&test_conditions::of(
+        &tests.conditions,
+        budget.as_ref(),
+        Some(&tests),
+    ));
+    Ok(tests.conditions.nanos())
 }
 
 /// States machine, time, software, the recording and what did not go as planned.

@@ -7,7 +7,7 @@ use metrology::number::number;
 use metrology::{Axis, Host, epoch, yaml};
 use node_runtime::tap::Selection;
 use node_runtime::text_file;
-use recorder::ChunkCompression;
+use recorder::{ChunkCompression, RecorderConfig};
 use reports::ReportKind;
 use reports::evaluate::budget::Budget;
 use schemars::JsonSchema;
@@ -84,6 +84,9 @@ impl ScenarioFile {
                 "recording.exclude = {exclude:?}: leaves out every topic, so that nothing would be recorded: exclude less"
             );
         }
+        if let Err(rule) = self.recording.config().checked() {
+            bail!("recording.{rule}");
+        }
         if let Some(start_s) = self.simulated_start_s {
             let room_s = (limit_min * 60.0).ceil() as i64 + AFTER_PLAN_S;
             epoch::whole_seconds::<Host>(start_s, room_s)
@@ -105,6 +108,19 @@ pub struct RecordingFile {
     pub max_file_s: f64,
     /// Absolute names of topics that are left out; `*` stands for any run of characters. A bag without its inputs cannot be computed again.
     pub exclude: Vec<String>,
+}
+
+impl RecordingFile {
+    /// As the recorder takes it, with its defaults for the rest.
+    #[must_use]
+    pub fn config(&self) -> RecorderConfig {
+        RecorderConfig {
+            compression: self.compression,
+            max_file_bytes: self.max_file_bytes,
+            max_file_s: self.max_file_s,
+            ..RecorderConfig::default()
+        }
+    }
 }
 
 /// A screw-compensation file that is tried on the control that it is made for.
@@ -260,6 +276,35 @@ mod tests {
         assert!(format!("{root:#}").contains("scenario /"), "{root:#}");
         let absent = name_of(&home.path().join("absent").join("..")).unwrap_err();
         assert!(format!("{absent:#}").contains("absent"), "{absent:#}");
+    }
+
+    /// As the recorder's own: what `validate` accepts a run takes.
+    #[test]
+    fn recording_keys_are_checked_where_the_file_is_read() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join(SCENARIO_FILE);
+        for (key, is_right) in [
+            ("max_file_s: 0", true),
+            ("max_file_s: 3600", true),
+            ("max_file_s: .nan", false),
+            ("max_file_s: .inf", false),
+            ("max_file_s: -1", false),
+            ("max_file_s: 1.0e-320", false),
+            ("max_file_s: 1.0e+308", false),
+        ] {
+            std::fs::write(
+                &path,
+                format!("title: t\nreport: tests\nlimit_min: 1.0\nrecording: {{{key}}}\n"),
+            )
+            .unwrap();
+            let read = ScenarioFile::read(&path);
+            assert_eq!(read.is_ok(), is_right, "{key}: {read:?}");
+            let words = read.err().map(|error| format!("{error:#}"));
+            assert!(
+                words.is_none_or(|words| words.contains("recording.max_file_s")),
+                "{key}"
+            );
+        }
     }
 
     #[test]

@@ -8,7 +8,6 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use gap_diagnosis::GapReport;
 use node_runtime::text_file;
-use serde_json::Value;
 use trials::shop::{Answer, ShopEffect, ShopSession, answer};
 use trials::{Truth, Verdict, judge};
 
@@ -140,12 +139,7 @@ fn diagnosed(folder: &Path, names: &[&str]) -> Result<Reported> {
         return Ok(Err(format!("diagnose: {told}")));
     }
     let text = text_file::bytes(&folder.join(REPORT))?;
-    let mut report: Value = serde_json::from_slice(&text).context("report of abbe diagnose")?;
-    // A page's note on the machine file, which is no part of a report.
-    if let Some(keys) = report.as_object_mut() {
-        keys.remove("machine_defaults");
-    }
-    let report = serde_json::from_value(report).context("report of abbe diagnose")?;
+    let report = serde_json::from_slice(&text).context("report of abbe diagnose")?;
     Ok(Ok((
         report,
         String::from_utf8_lossy(&output.stdout).into_owned(),

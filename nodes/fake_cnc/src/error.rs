@@ -168,9 +168,13 @@ pub enum ProgramError {
     )]
     FixedFrame { at: Place, word: String },
     #[error(
-        "{at}: (frame: machine): the offset {offset} by G92 or G52 is in effect; clear it by G92.1, or by G52 X0 Y0 Z0"
+        "{at}: (frame: machine): the offset {offset} by G92 or G52 is in effect; clear it by G92.1, or by {zeros}"
     )]
-    ShiftInEffect { at: Place, offset: String },
+    ShiftInEffect {
+        at: Place,
+        offset: String,
+        zeros: String,
+    },
     #[error(
         "{at}: (frame: machine): every work system has an offset, and none is overwritten: {systems}; clear one of them, such as by G10 L2 P9 X0 Y0 Z0 A0 B0 C0 R0 for G59.3 with the machine's axes"
     )]

@@ -11,6 +11,7 @@ use crate::config::GapConfig;
 use crate::error::GapError;
 use crate::experiment::Experiment;
 use crate::judgement::along;
+use crate::judgement::by_thermometer;
 use crate::judgement::cause::Found;
 use crate::judgement::guard;
 use crate::judgement::unknown::Leftover;
@@ -19,12 +20,11 @@ use crate::judgement::{recalibration, unknown};
 use crate::next::{self, Bench};
 use crate::noise::form_error::FormError;
 use crate::noise::stack::Stack;
+use crate::noise::unrepeated;
 use crate::noise::whiteness;
 use crate::noise::{self, Noise, Readings};
 use crate::report::figures::{Figures, Note};
-use crate::report::{
-    DoesNotRepeat, GapReport, Inputs, NoiseFloor, NotExcited, OverSession, SCHEMA,
-};
+use crate::report::{DoesNotRepeat, GapReport, NoiseFloor, NotExcited, OverSession, SCHEMA};
 use crate::report::{localise, places};
 use crate::search::families::Slot;
 use crate::search::isolability;
@@ -33,6 +33,7 @@ use crate::search::rows::Rows;
 use crate::search::searched::{Base, Searched, less, told};
 use crate::session::changes::{self, Change};
 use crate::session::fewer::{MIN_STATIONS_KEPT, fewer};
+use crate::session::log;
 use crate::session::over_session;
 use crate::session::thermal_floats::ThermalFloat;
 use crate::shrink::gap;
@@ -263,7 +264,8 @@ impl<'a> Base<'a> {
             inflation,
             ..
         } = searched;
-        let noise_check = guard::judge(&inflation, config, &mut notes);
+        let has_repeats = !(unrepeated::is_assumed(self.noise) && log::is_of_logs(&stack));
+        let noise_check = guard::judge(&inflation, config, has_repeats, &mut notes);
         found.add_check(&noise_check);
         scattered.add_check(&noise_check);
         let reproduced = !noise_check.has_failed();
@@ -286,7 +288,6 @@ impl<'a> Base<'a> {
         let figures = figures(&stack, &slots, [&before, &beside], &found, &shrunk, config);
         let report = GapReport {
             schema: SCHEMA.to_owned(),
-            inputs: Inputs::default(),
             noise_floor: noise_floor(self.noise, &inflation, config),
             gap: gap::table(&all, &sizes, before.flagged()),
             r#where: places::places(&stack, &slots, &before.families, &floated),
@@ -295,9 +296,9 @@ impl<'a> Base<'a> {
             shrink: shrunk.shrink,
             not_excited: not_excited(&found, &scattered.seen, kinds),
             next_experiments: next.entries,
-            runtime_s: 0.0,
             over_session,
             does_not_repeat,
+            ..GapReport::default()
         };
         Diagnosis {
             report,
@@ -467,7 +468,10 @@ pub(crate) fn considered(config: &GapConfig) -> Result<Vec<&'static Kind>, GapEr
     {
         return Err(GapError::LeftOut { id: id.clone() });
     }
-    let kept = |kind: &&&'static Kind| config.left_out.iter().all(|id| id != kind.id);
+    // Only a log asks for what goes with a thermometer (`by_thermometer`).
+    let kept = |kind: &&&'static Kind| {
+        kind.id != by_thermometer::SHIFT && config.left_out.iter().all(|id| id != kind.id)
+    };
     Ok(CATALOGUE.iter().filter(kept).copied().collect())
 }
 

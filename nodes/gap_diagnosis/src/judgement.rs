@@ -16,6 +16,7 @@ pub(crate) mod plain;
 pub(crate) mod recalibration;
 pub mod rule;
 pub(crate) mod unknown;
+pub(crate) mod unresolved;
 pub(crate) mod veto;
 
 use serde::{Deserialize, Serialize};

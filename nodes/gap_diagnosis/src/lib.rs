@@ -54,6 +54,7 @@ pub use report::figures;
 pub use report::figures::{Course, Figures, Note};
 pub use search::problem;
 pub use search::regression;
+pub use search::signature::OWN_TIME;
 pub use session::thermal::{GoesWith, ThermalFit};
 pub use shrink::closed::MIN_RUNS_CLOSED as LEAST_JUDGED_RUNS;
 pub use stage::{GapDiagnosisStage, Input, Output};

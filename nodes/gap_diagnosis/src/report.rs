@@ -11,6 +11,7 @@ pub(crate) mod localise;
 pub(crate) mod places;
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 pub use crate::judgement::{Check, CheckId, Side, Verdict};
 
@@ -18,7 +19,7 @@ pub use crate::judgement::{Check, CheckId, Side, Verdict};
 pub const SCHEMA: &str = "abbe.gap/1";
 
 /// The whole report.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GapReport {
     /// [`SCHEMA`].
@@ -49,6 +50,31 @@ pub struct GapReport {
     /// What changed between repeats and no named effect explains, or a set-up that moved would make as well; absent where nothing did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub does_not_repeat: Vec<DoesNotRepeat>,
+    /// What of each bag was lost or left out, null where nothing was; absent where all were whole.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub loss: Vec<Value>,
+    /// Defaults of the machine file that the diagnosis uses, as `axes.X.lead_mm = 10.0`; absent without any.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub machine_defaults: Vec<String>,
+    /// The simulator in the place of the machine file's own, and what of the recording has a match in it; absent without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simulated: Option<Value>,
+    /// What was not considered; absent where everything was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_with: Option<MadeWith>,
+    /// Figures with a limit, and how they stand to it; absent without limits.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alarms: Option<Value>,
+}
+
+/// What a diagnosis did not consider.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MadeWith {
+    /// Ids of effects.
+    pub without: Vec<String>,
+    /// Ids of rules that were switched off.
+    pub ablated: Vec<String>,
 }
 
 /// Whether the size of a named effect holds over the session.
@@ -135,7 +161,7 @@ pub struct NoiseFloor {
 }
 
 /// Size of the gap.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gap {
     /// Root mean square after set-up nuisances, µm.
@@ -282,7 +308,7 @@ pub struct Constancy {
 }
 
 /// What no effect explains.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Unknown {
     /// Whether there is such a rest.
@@ -312,7 +338,7 @@ pub struct Description {
 }
 
 /// How far the gap shrinks.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shrink {
     /// Runs that effects were found and sized on.

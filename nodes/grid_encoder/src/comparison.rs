@@ -49,6 +49,9 @@ pub struct Compared {
     pub other_mm: f64,
     /// As either choice of 14 stations prints it with U = 0, mm at the radius; `None` without [`Comparison::fourteen`].
     pub fourteen_mm: Option<[f64; 2]>,
+    /// Standard uncertainty of the published value, (5) of `published`, mm at the radius; means nothing where the circle does not
+    /// determine it.
+    pub standard_uncertainty_mm: f64,
     /// Whether the circle determines it, (2).
     pub visibility: Visibility,
     /// Its own unit per mm at the radius.
@@ -141,6 +144,7 @@ pub fn compare(
         unknown: determined.unknowns[j].clone(),
         published_mm: published.beta_mm[j],
         other_mm: other.beta_mm[j],
+        standard_uncertainty_mm: published.standard_uncertainty_mm[j],
         visibility: determined.visibility[j],
         scale: system.scale[j],
     });

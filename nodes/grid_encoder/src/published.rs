@@ -10,7 +10,10 @@
 //!   EXX, EYY, ECY: powers 1 to 3;  EXY, EYX: powers 2 and 3:  14 unknowns with EC0Y        (2)
 //!   ΔR = (x C_x + y C_y) / R                                                               (3)
 //!   Y = X β,   G = (XᵀX)⁻,   β = G Xᵀ Y + [I − G XᵀX] U                                    (4)
+//!   u²(β_j) = s² G_jj,   s² = |Y − X β|² / (stations − rank)                               (5)
 //! ```
+//!
+//! (5) is the uncertainty of an unknown that the stations determine; of any other it is a number of the method.
 //!
 //! (3) and (4) are printed in the source; (1) and (2) were images that are lost, and are derived: cubic
 //! polynomials without constant term, one parameter for squareness and 14 unknowns leave this reading.
@@ -62,6 +65,8 @@ pub struct PublishedSolution {
     pub coefficients: Vec<f64>,
     /// ΔR that it predicts at the stations it was solved from, mm.
     pub trace_mm: DVector<f64>,
+    /// (5), mm at the radius; zero without a station beyond the rank.
+    pub standard_uncertainty_mm: Vec<f64>,
     /// Rank of X.
     pub rank: usize,
 }
@@ -181,14 +186,21 @@ pub fn solve(system: &RadialSystem, radial_mm: &[f64], arbitrary_mm: &[f64]) -> 
     let u = DVector::from_fn(p, |j, _| arbitrary_mm.get(j).copied().unwrap_or(0.0));
     let gram = x.transpose() * x;
     let (g, rank) = generalised_inverse(&gram);
-    let beta_mm = &g * x.transpose() * y + (DMatrix::identity(p, p) - &g * &gram) * u; // (4)
+    let beta_mm = &g * x.transpose() * &y + (DMatrix::identity(p, p) - &g * &gram) * u; // (4)
+    let trace_mm = x * &beta_mm;
+    let left = n.saturating_sub(rank).max(1) as f64;
+    let cofactors = g.diagonal();
+    let variance_mm2 = (y - &trace_mm).norm_squared() / left; // (5)
     PublishedSolution {
         coefficients: beta_mm
             .iter()
             .zip(&system.scale)
             .map(|(b, s)| b * s)
             .collect(),
-        trace_mm: x * &beta_mm,
+        standard_uncertainty_mm: { cofactors.iter() }
+            .map(|cofactor| (variance_mm2 * cofactor).max(0.0).sqrt())
+            .collect(),
+        trace_mm,
         beta_mm,
         rank,
     }
@@ -305,6 +317,33 @@ mod tests {
                 assert!(
                     (found - expected).abs() < 1e-12,
                     "{i} {j}: {found} {expected}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn val_numpy_eq5_off_the_origin_the_turn_is_known_three_hundred_times_worse() {
+        // numpy: pinv and singular values of the columns of `eq3_columns_are_those_of_the_derived_formula` at 360 stations of
+        // a circle of 50 mm, for a trace of 1 µm cos 7θ; the tenth singular value is 1.22e-4 of the first off the origin.
+        let kinematics =
+            Kinematics::of_chain("[w X' Y' b Z t]".parse().unwrap(), PerAxis::default());
+        let radial: Vec<f64> = angles().iter().map(|a| 1e-3 * (7.0 * a).cos()).collect();
+        for (y_mm, in_order) in [
+            (0.0, [(0, 0.2327), (10, 0.1075), (13, 1.1926)]),
+            (-150.0, [(0, 0.5256), (10, 92.1385), (13, 305.2978)]),
+        ] {
+            let place = Place::circle(TestPlane::Xy, Vector3::new(0.0, y_mm, 0.0), R_MM, 360);
+            let components = fourteen_unknowns(&place).unwrap();
+            let system = radial_system(&kinematics, &components, &place, &angles());
+            let solution = solve(&system, &radial, &[]);
+            assert_eq!(solution.rank, 10);
+            for (j, per_s) in in_order {
+                let u_mm = solution.standard_uncertainty_mm[j];
+                let expected_mm = 0.717_137_2e-3 * per_s;
+                assert!(
+                    (u_mm / expected_mm - 1.0).abs() < 1e-3,
+                    "{y_mm} {j}: {u_mm}"
                 );
             }
         }

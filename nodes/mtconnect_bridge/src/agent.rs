@@ -103,6 +103,9 @@ pub enum Heard {
 /// Parts in a row that cannot be read before no value counts as known any more.
 const MOST_UNREADABLE: u32 = 3;
 
+/// Numbers in a row that an agent may call out of range; beyond, it refuses.
+const MOST_OUT_OF_RANGE: u8 = 2;
+
 /// The conversation with one agent.
 #[derive(Clone, Debug)]
 pub struct AgentLink {
@@ -116,6 +119,8 @@ pub struct AgentLink {
     next: Option<u64>,
     gap_from: Option<u64>,
     passes_over: bool,
+    /// Numbers in a row that the agent called out of range.
+    out_of_range: u8,
     resumes: bool,
     lost: u64,
     /// Gaps in the numbers of all devices, where one is asked for.
@@ -142,6 +147,7 @@ impl AgentLink {
             next: None,
             gap_from: None,
             passes_over: false,
+            out_of_range: 0,
             resumes: false,
             lost: 0,
             gaps: 0,
@@ -300,8 +306,9 @@ impl AgentLink {
                 Ok(())
             }
             (Answer::Error { errors }, Asked::Sample { .. } | Asked::Again)
-                if is_out_of_range(&errors) =>
+                if is_out_of_range(&errors) && self.out_of_range < MOST_OUT_OF_RANGE =>
             {
+                self.out_of_range += 1;
                 self.gap_from = self.next.take();
                 self.ask_again(at, out);
                 Ok(())

@@ -214,7 +214,8 @@ fn errors(root: &Node<'_, '_>) -> Vec<(String, String)> {
     let all = root.descendants().filter(Node::is_element);
     let all = all.filter_map(|node| {
         let code = node.attribute("errorCode")?;
-        let said = node.descendants().filter_map(|below| below.text());
+        let said = node.descendants().filter(Node::is_text);
+        let said = said.filter_map(|below| below.text());
         let words = said.map(str::trim).filter(|text| !text.is_empty());
         let words: Vec<_> = words.take(ERROR_TEXTS).map(begin).collect();
         Some((begin(code).to_owned(), words.join(" ")))
@@ -352,32 +353,41 @@ fn alarm(node: &Node<'_, '_>) -> Option<AlarmReport> {
         code: attribute(node, "nativeCode"),
         severity: attribute(node, "nativeSeverity"),
         qualifier: attribute(node, "qualifier"),
-        text: node.text().unwrap_or_default().trim().to_owned(),
+        text: words(node)?,
     })
 }
 
+/// What stands between the tags of an element, whatever comments and instructions part it; `None` where elements stand in it.
+fn words(node: &Node<'_, '_>) -> Option<String> {
+    if node.children().any(|below| below.is_element()) {
+        return None;
+    }
+    let parts = node.children().filter(Node::is_text);
+    let text: String = parts.filter_map(|part| part.text()).collect();
+    Some(text.trim().to_owned())
+}
+
 fn told(node: &Node<'_, '_>) -> Option<Told> {
-    let text = node.text().unwrap_or_default().trim();
+    let mut entries = node
+        .children()
+        .filter(|below| is(below, "Entry"))
+        .peekable();
+    if entries.peek().is_some() {
+        let of =
+            |entry: Node<'_, '_>| Some(format!("{}={}", attribute(&entry, "key"), words(&entry)?));
+        return Some(Told::Value(
+            entries.map(of).collect::<Option<Vec<_>>>()?.join(" "),
+        ));
+    }
+    let text = words(node)?;
     if text.eq_ignore_ascii_case(UNAVAILABLE) {
         return Some(Told::Unavailable);
     }
     if let Some(count) = node.attribute("sampleCount") {
         let rate = node.attribute("sampleRate").unwrap_or_default();
-        return read_series(Some(count.parse().ok()?), rate, text);
+        return read_series(Some(count.parse().ok()?), rate, &text);
     }
-    let entries = node.children().filter(|below| is(below, "Entry"));
-    let entries: Vec<_> = entries
-        .map(|entry| {
-            let value = entry.text().unwrap_or_default().trim().to_owned();
-            format!("{}={value}", attribute(&entry, "key"))
-        })
-        .collect();
-    let value = if entries.is_empty() {
-        text.to_owned()
-    } else {
-        entries.join(" ")
-    };
-    Some(Told::Value(value))
+    Some(Told::Value(text))
 }
 
 #[cfg(test)]
@@ -418,6 +428,54 @@ mod tests {
             let shown = read(bytes).unwrap_err().to_string();
             assert!(shown.contains(words), "{words}: {shown}");
         }
+    }
+
+    /// The string value of an element by XPath: its text, whatever comments, instructions and sections of data part it.
+    #[test]
+    fn a_value_that_comments_part_is_whole_and_one_with_elements_in_it_is_none() {
+        let long = "<MTConnectStreams><Header instanceId=\"7\" firstSequence=\"1\" lastSequence=\"1\" nextSequence=\"2\"/><Streams><DeviceStream name=\"m\"><ComponentStream component=\"L\"><Samples><Position dataItemId=\"x\" timestamp=\"2016-11-29T10:00:00Z\" sequence=\"1\">TEXT</Position></Samples></ComponentStream></DeviceStream></Streams></MTConnectStreams>";
+        for (text, wanted) in [
+            ("5<!-- x -->.6", Some("5.6")),
+            ("9<?pi x?>.75", Some("9.75")),
+            ("<!-- 3 -->1.5", Some("1.5")),
+            ("<![CDATA[12]]>.5", Some("12.5")),
+            ("&#49;2", Some("12")),
+            ("AVAIL<!-- x -->ABLE", Some("AVAILABLE")),
+            ("1<b/>2", None),
+            ("<b>7</b>", None),
+        ] {
+            let answer = read(long.replace("TEXT", text).as_bytes()).unwrap();
+            let Answer::Streams {
+                observations,
+                malformed,
+                ..
+            } = answer
+            else {
+                panic!("{text}");
+            };
+            let found = observations.first().map(|one| one.observation.told.clone());
+            assert_eq!(
+                found,
+                wanted.map(|value| Told::Value(value.to_owned())),
+                "{text}"
+            );
+            assert_eq!(malformed, usize::from(wanted.is_none()), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_agents_words_of_an_error_stand_once() {
+        let text = "<MTConnectError><Header instanceId=\"7\"/><Errors><Error errorCode=\"INVALID_REQUEST\">from must be a number</Error></Errors></MTConnectError>";
+        let Answer::Error { errors } = read(text.as_bytes()).unwrap() else {
+            panic!("an error");
+        };
+        assert_eq!(
+            errors,
+            [(
+                "INVALID_REQUEST".to_owned(),
+                "from must be a number".to_owned()
+            )]
+        );
     }
 
     #[test]

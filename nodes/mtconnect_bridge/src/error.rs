@@ -77,6 +77,18 @@ pub enum BridgeError {
         /// Its name.
         name: String,
     },
+    /// The log never says how fast the spindle turns.
+    #[error(
+        "spindle \"{name}\": the log has no speed of it from {from} to {to} (UTC): correct its key in the mapping, or take another range"
+    )]
+    SilentSpindle {
+        /// Its name.
+        name: String,
+        /// First instant that was asked for.
+        from: String,
+        /// Last one.
+        to: String,
+    },
     /// The log has no value within the shift.
     #[error(
         "the order asks for {from} to {to}, and nothing of the log lies within (all times in UTC): {reason}; {account}"

@@ -3,8 +3,10 @@
 use std::fmt;
 
 use abbe_msgs::Defect;
-use metrology::stamp::NANOS_PER_S;
+use metrology::epoch::utc_of_nanos;
 use serde::Serialize;
+
+use crate::stamps::nanos_of;
 
 /// Why messages were left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -28,12 +30,20 @@ pub enum Reason {
     OtherAxis,
     /// A reading of another time than the messages beside it.
     OtherTime,
+    /// A reading of another zero of its instrument than that of its run.
+    OtherZero,
+    /// A reading in another plane than that of its run.
+    OtherPlane,
+    /// A value far from those beside it.
+    Outlier,
     /// The bag has the same message already.
     Repeated,
     /// A reading further from its nominal place than any machine is.
     Beyond,
     /// Axis states of other axes than the machine file's, or far outside its travel.
     OtherMachine,
+    /// Of a run whose end states otherwise than its begin.
+    Contradiction,
     /// Of a run without an end.
     NoEnd,
     /// Of a run without a begin.
@@ -70,9 +80,13 @@ impl Reason {
             Self::OutOfRange => Defect::OutOfRange.words(),
             Self::OtherAxis => "of another axis than its run's",
             Self::OtherTime => "of another time than the messages beside it",
+            Self::OtherZero => "of another zero than its run's",
+            Self::OtherPlane => "of another plane than its run's",
+            Self::Outlier => "far from those beside it",
             Self::Repeated => "repeated",
             Self::Beyond => "too far from its nominal place",
             Self::OtherMachine => "not of the machine of the machine file",
+            Self::Contradiction => "of a run whose begin and end contradict each other",
             Self::NoEnd => "of a run without an end",
             Self::NoBegin => "of a run without a begin",
             Self::NoPlace => "of a run without places of the axes",
@@ -216,18 +230,14 @@ impl Account {
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let nanos_per_s = NANOS_PER_S.unsigned_abs();
-        let (s, ns) = (
-            self.log_time_nanos / nanos_per_s,
-            self.log_time_nanos % nanos_per_s,
-        );
+        let recorded_at = utc_of_nanos(self.log_time_nanos, 9);
         write!(
             f,
-            "the first is number {}, recorded at {s}.{ns:09} s",
+            "the first is number {}, recorded at {recorded_at}",
             self.number
         )?;
         match self.stamp {
-            Some((sec, nanosec)) => write!(f, ", stamp {sec} s {nanosec} ns"),
+            Some(stamp) => write!(f, ", stamp {}", utc_of_nanos(nanos_of(stamp), 9)),
             None => Ok(()),
         }
     }
@@ -258,8 +268,8 @@ mod tests {
         assert_eq!(
             account.lines().collect::<Vec<_>>(),
             [
-                "/axes/state: 2 of 9 messages left out, not finite: what of 3 (the first is number 3, recorded at 1700000000.012000003 s, stamp 1700000000 s 5 ns)",
-                "/axes/state: 1 of 9 messages left out, malformed: what of 7 (the first is number 7, recorded at 1700000000.012000007 s)",
+                "/axes/state: 2 of 9 messages left out, not finite: what of 3 (the first is number 3, recorded at 2023-11-14 22:13:20.012000003 UTC, stamp 2023-11-14 22:13:20.000000005 UTC)",
+                "/axes/state: 1 of 9 messages left out, malformed: what of 7 (the first is number 7, recorded at 2023-11-14 22:13:20.012000007 UTC)",
             ]
         );
         assert_eq!(account.left_out(), 3);

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use metrology::epoch::{self, END_NANOS};
+use metrology::epoch::{self, END_NANOS, utc_of_nanos};
 use metrology::stamp::{Host, NANOS_PER_S, Span, Stamp};
 use recorder::{Bag, Event, Order};
 use serde::Serialize;
@@ -43,15 +43,14 @@ impl Leap {
 
 impl fmt::Display for Leap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let seconds = |nanos: u64| nanos as f64 / NANOS_PER_S as f64;
         let way = if self.to_nanos < self.from_nanos {
             " back"
         } else {
             ""
         };
-        let length = duration(seconds(self.length_nanos()));
-        let (from_s, to_s) = (seconds(self.from_nanos), seconds(self.to_nanos));
-        write!(f, "{length}{way}, from {from_s:.3} s to {to_s:.3} s")
+        let length = duration(self.length_nanos() as f64 / NANOS_PER_S as f64);
+        let [from, to] = [self.from_nanos, self.to_nanos].map(|nanos| utc_of_nanos(nanos, 3));
+        write!(f, "{length}{way}, from {from} to {to}")
     }
 }
 
@@ -159,18 +158,27 @@ mod tests {
                 0,
                 HOUR + 1,
                 Some(
-                    "1 leap of more than 60 min; the longest is 60 min, from 0.000 s to 3600.000 s",
+                    "1 leap of more than 60 min; the longest is 60 min, from 1970-01-01 00:00:00.000 UTC to 1970-01-01 01:00:00.000 UTC",
                 ),
             ),
             (
                 0,
                 DAY,
-                Some("the longest is 24.0 h, from 0.000 s to 86400.000 s"),
+                Some(
+                    "the longest is 24.0 h, from 1970-01-01 00:00:00.000 UTC to 1970-01-02 00:00:00.000 UTC",
+                ),
             ),
             (
                 DAY,
                 0,
-                Some("the longest is 24.0 h back, from 86400.000 s to 0.000 s"),
+                Some(
+                    "the longest is 24.0 h back, from 1970-01-02 00:00:00.000 UTC to 1970-01-01 00:00:00.000 UTC",
+                ),
+            ),
+            (
+                1_700_003_585 * S,
+                1_700_020_000 * S,
+                Some("from 2023-11-14 23:13:05.000 UTC to 2023-11-15 03:46:40.000 UTC"),
             ),
             (0, u64::MAX, Some("the longest is 584.5 years")),
         ] {

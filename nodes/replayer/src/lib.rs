@@ -23,6 +23,7 @@ pub mod known;
 pub mod leap;
 mod listening;
 pub mod machines;
+mod outliers;
 pub mod pace;
 pub mod pause;
 pub mod playback;
@@ -30,6 +31,7 @@ pub mod reading;
 mod repeats;
 mod replay;
 mod stamps;
+mod turned;
 mod usable;
 
 pub use account::{Account, LeftOut, Place, Reason, TopicAccount};

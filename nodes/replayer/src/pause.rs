@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use metrology::epoch::utc_of_nanos;
 use metrology::stamp::{Host, Span, Stamp};
 
 /// A longer pause is reported when it begins.
@@ -56,14 +57,15 @@ impl fmt::Display for Pause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let length = duration((self.to - self.from).as_secs_f64());
         let wait = duration(self.wait_s());
-        let (from_s, to_s, rate) = (self.from.as_secs_f64(), self.to.as_secs_f64(), self.rate);
-        write!(f, "nothing was recorded for {length}, from {from_s:.3} s")?;
+        let [from, to] = [self.from, self.to].map(|at| utc_of_nanos(at.nanos(), 3));
+        let rate = self.rate;
+        write!(f, "nothing was recorded for {length}, from {from}")?;
         if self.from.nanos() == 0 {
             write!(f, " (the recorder's clock was not set)")?;
         }
         write!(
             f,
-            " to {to_s:.3} s: {wait} pass at rate {rate}; --from {:.3} begins behind it, a higher --rate shortens it, --rate 0 waits for nothing",
+            " to {to}: {wait} pass at rate {rate}; --from {:.3} begins behind it, a higher --rate shortens it, --rate 0 waits for nothing",
             self.from_s()
         )
     }
@@ -94,8 +96,8 @@ mod tests {
         let pause = Pause::between(first, first, today, 2.0).unwrap();
         let text = pause.to_string();
         for words in [
-            "nothing was recorded for 55.9 years, from 0.000 s (the recorder's clock was not set)",
-            "to 1764000000.000 s: 27.9 years pass at rate 2",
+            "nothing was recorded for 55.9 years, from 1970-01-01 00:00:00.000 UTC (the recorder's clock was not set)",
+            "to 2025-11-24 16:00:00.000 UTC: 27.9 years pass at rate 2",
             "--from 1763999999.999 begins behind it",
             "--rate 0",
         ] {
@@ -103,7 +105,8 @@ mod tests {
         }
         let later = Pause::between(at(100), at(200), at(200 + 3_601), 1.0).unwrap();
         let text = later.to_string();
-        assert!(text.contains("for 60 min, from 200.000 s to"), "{text}");
+        let words = "for 60 min, from 1970-01-01 00:03:20.000 UTC to";
+        assert!(text.contains(words), "{text}");
         assert!((later.from_s() - 3_700.999).abs() < 1e-9);
         assert!(Pause::between(first, first, at(3_600), 1.0).is_none());
     }

@@ -14,17 +14,22 @@
 //! on one side, between the first stamp of the bag and the time of recording. Otherwise its messages are left out.
 //!
 //! Holds when most stamps of a topic are right. A clock that was set for more than a third of a recording is no wrong stamp.
-//! A topic whose stamps are all of another time than those of the others is found by [`clocks`].
+//! A topic whose stamps are all of another time than those of the others is found by [`clocks`]. Outliers of thermometers
+//! ([`crate::outliers`]) are found in the same pass.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use abbe_msgs::Durability;
-use abbe_msgs::topics::Entry;
-use metrology::stamp::{Host, NANOS_PER_S, Span, Stamp};
+use abbe_msgs::sensor_msgs::msg::Temperature;
+use abbe_msgs::topics::{self, Entry};
+use abbe_msgs::{Durability, Wire, from_cdr};
+use metrology::epoch::utc_of_nanos;
+use metrology::stamp::{NANOS_PER_S, Span};
 use recorder::{Bag, Event, MessageRef, Order, TopicId};
 
 use crate::known::entry_in_any_namespace;
 use crate::leap::{self, LEAST};
+use crate::outliers::{Course, Outlier};
+use crate::pause::duration;
 use crate::reading::stamp_of;
 
 mod clocks;
@@ -62,6 +67,8 @@ type Key = (usize, u64, i64);
 #[derive(Debug, Default)]
 pub(crate) struct WrongStamps {
     found: BTreeMap<Key, Limits>,
+    /// Readings of thermometers that are no temperatures.
+    outliers: BTreeMap<Key, Outlier>,
     /// The topics that are of another clock.
     other_clocks: BTreeMap<usize, OtherClock>,
 }
@@ -196,14 +203,17 @@ impl WrongStamps {
                 (entry.description.type_name == info.type_name).then_some(entry)
             })
             .collect();
-        let (mut topics, strays) = read(bag, &entries);
+        let (mut topics, strays, outliers) = read(bag, &entries);
         for topic in &mut topics {
             let levels = levels(topic.groups.iter());
             let groups = topic.groups.iter_mut();
             groups.for_each(|group| group.is_firm = is_of(&levels, group));
         }
         let Some(times) = BagTimes::of(&topics) else {
-            return Self::default();
+            return Self {
+                outliers,
+                ..Self::default()
+            };
         };
         let other_clocks = clocks::others(&topics);
         let wrong: BTreeMap<usize, Vec<(Group, Limits)>> = topics
@@ -213,6 +223,7 @@ impl WrongStamps {
             .collect();
         Self {
             found: Self::found(bag, &entries, &wrong),
+            outliers,
             other_clocks,
         }
     }
@@ -263,13 +274,23 @@ impl WrongStamps {
         let offset = Span::from_nanos(offset_nanos.saturating_abs());
         let way = if offset_nanos < 0 { "earlier" } else { "later" };
         Some(format!(
-            "its stamps are {:.0} s from those of the other topics, {way}: {} to {} s, those {} to {} s; set the clock that stamped it",
-            offset.as_secs_f64(),
-            seconds(first),
-            seconds(last),
-            seconds(from),
-            seconds(to)
+            "its stamps are {} {way} than those of the other topics: {} to {}, those {} to {}; set the clock that stamped it",
+            duration(offset.as_secs_f64()),
+            date(first),
+            date(last),
+            date(from),
+            date(to)
         ))
+    }
+
+    /// What is wrong with what a thermometer says in a message of type `type_name`; `None`: nothing, or it is of no thermometer.
+    pub(crate) fn outlier(&self, message: &MessageRef<'_>, type_name: &str) -> Option<String> {
+        if self.outliers.is_empty() {
+            return None;
+        }
+        let stamp = nanos_of(stamp_of(type_name, message.data)?);
+        let key = (message.topic.index(), message.log_time_nanos, stamp);
+        self.outliers.get(&key).map(|outlier| outlier.in_words())
     }
 
     /// What is wrong with the stamp of a message of type `type_name`; `None`: it fits.
@@ -281,16 +302,21 @@ impl WrongStamps {
         let key = (message.topic.index(), message.log_time_nanos, stamp);
         let limits = self.found.get(&key)?;
         Some(format!(
-            "header.stamp = {} s: must be from {} to {} s by the messages beside it; set the clock that stamped it",
-            seconds(stamp),
-            seconds(limits.low_nanos),
-            seconds(limits.high_nanos)
+            "header.stamp = {}: must be from {} to {} by the messages beside it; set the clock that stamped it",
+            date(stamp),
+            date(limits.low_nanos),
+            date(limits.high_nanos)
         ))
     }
 }
 
-/// Reads the groups of each topic of ours, and which messages have a wrong log time.
-fn read(bag: &Bag, entries: &[Option<&'static Entry>]) -> (Vec<TopicStamps>, BTreeSet<u64>) {
+/// What is read of the stamps of a bag: the groups of each topic of ours, which messages have a wrong log time, and the
+/// outliers of thermometers.
+type Found = (Vec<TopicStamps>, BTreeSet<u64>, BTreeMap<Key, Outlier>);
+
+fn read(bag: &Bag, entries: &[Option<&'static Entry>]) -> Found {
+    let mut thermometers: BTreeMap<usize, Course<Key>> = BTreeMap::new();
+    let mut outliers = BTreeMap::new();
     let mut groups: Vec<Vec<Group>> = entries.iter().map(|_| Vec::new()).collect();
     let mut messages = bag.messages(Order::File);
     let mut number = 0_u64;
@@ -301,7 +327,12 @@ fn read(bag: &Bag, entries: &[Option<&'static Entry>]) -> (Vec<TopicStamps>, BTr
             };
             let at = number;
             number += 1;
-            if let Some((topic, log_nanos, stamp)) = key(&message, entries) {
+            if let Some(key) = key(&message, entries) {
+                let (topic, log_nanos, stamp) = key;
+                if let Some(degc) = temperature(&message, entries) {
+                    let course = thermometers.entry(topic).or_default();
+                    outliers.extend(course.take(key, degc));
+                }
                 let log = i64::try_from(log_nanos).unwrap_or(i64::MAX);
                 let of_topic = &mut groups[topic];
                 if !of_topic.last_mut().is_some_and(|it| it.take(stamp, log)) {
@@ -312,6 +343,7 @@ fn read(bag: &Bag, entries: &[Option<&'static Entry>]) -> (Vec<TopicStamps>, BTr
         }
     });
     let strays = leap::strays_of(times, 0);
+    outliers.extend(thermometers.into_values().flat_map(Course::end));
     let topics = groups.into_iter().zip(entries).enumerate();
     let topics = topics.filter_map(|(topic, (groups, entry))| {
         Some(TopicStamps {
@@ -320,7 +352,15 @@ fn read(bag: &Bag, entries: &[Option<&'static Entry>]) -> (Vec<TopicStamps>, BTr
             groups,
         })
     });
-    (topics.collect(), strays)
+    (topics.collect(), strays, outliers)
+}
+
+/// What a message of a thermometer says, °C.
+fn temperature(message: &MessageRef<'_>, entries: &[Option<&'static Entry>]) -> Option<f64> {
+    let entry = entries.get(message.topic.index()).copied().flatten()?;
+    (entry.name == topics::TEMPERATURE.base).then_some(())?;
+    let wire = from_cdr::<Temperature>(message.data).ok()?;
+    Some(wire.to_inner().ok()?.temperature_degc)
 }
 
 /// The groups of a topic that do not fit, each with the limits of its stamps.
@@ -385,13 +425,12 @@ fn key(message: &MessageRef<'_>, entries: &[Option<&'static Entry>]) -> Option<K
 }
 
 /// A stamp in ns since 1970; its seconds are the bits of an unsigned number.
-fn nanos_of((sec, nanosec): (i32, u32)) -> i64 {
+pub(crate) fn nanos_of((sec, nanosec): (i32, u32)) -> i64 {
     i64::from(sec.cast_unsigned()) * NANOS_PER_S + i64::from(nanosec)
 }
 
-fn seconds(nanos: i64) -> String {
-    let span: Span = Stamp::<Host>::from_nanos(nanos) - Stamp::from_nanos(0);
-    format!("{:.3}", span.as_secs_f64())
+fn date(nanos: i64) -> String {
+    utc_of_nanos(nanos, 3)
 }
 
 #[cfg(test)]

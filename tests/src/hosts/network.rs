@@ -26,6 +26,15 @@ const INTERFACE: &str = "link0";
 /// variables come before the program.
 const UNDER_CLOCK: &str = r#"mount -t tmpfs -o size=64m tmpfs /dev/shm && exec env "$@""#;
 
+/// How a network lacks multicast.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Multicast {
+    /// Interfaces send it, and the network drops it.
+    Dropped,
+    /// No interface has it.
+    NotOffered,
+}
+
 /// A network namespace that is removed with it.
 struct Namespace(String);
 
@@ -87,6 +96,8 @@ pub struct Network {
     /// Computer clocks that are wrong, each with its host's place.
     clocks: Vec<(usize, ClockError, Faketime)>,
     domain: u16,
+    /// What nodes are told as `ROS_STATIC_PEERS`.
+    peers: Vec<String>,
     /// A router on each host, where nodes speak Zenoh.
     routers: Vec<Router>,
     _turn: MutexGuard<'static, ()>,
@@ -113,7 +124,7 @@ impl Network {
             let namespace =
                 Namespace::make(format!("abbe-{}-{domain}-{name}", std::process::id()))?;
             taps.push(namespace.inside(tap)??);
-            let address = format!("10.77.0.{}/24", place + 1);
+            let address = format!("{}/24", address(place));
             namespace.ip(&["address", "add", &address, "dev", INTERFACE])?;
             namespace.ip(&["link", "set", "lo", "up"])?;
             namespace.ip(&["link", "set", INTERFACE, "up"])?;
@@ -124,9 +135,27 @@ impl Network {
             hosts,
             clocks: Vec::new(),
             domain,
+            peers: Vec::new(),
             routers: Vec::new(),
             _turn: turn,
         })
+    }
+
+    /// Takes multicast away, and names all hosts to programs and threads that begin from now on.
+    ///
+    /// # Panics
+    /// When an interface cannot be set.
+    pub fn name_hosts_without(&mut self, multicast: Multicast) {
+        match multicast {
+            Multicast::Dropped => self.switch.drop_multicast(),
+            Multicast::NotOffered => {
+                for (_, namespace) in &self.hosts {
+                    let off = ["link", "set", INTERFACE, "multicast", "off"];
+                    namespace.ip(&off).unwrap();
+                }
+            }
+        }
+        self.peers = (0..self.hosts.len()).map(address).collect();
     }
 
     /// Lets nodes speak Zenoh, as `rmw_zenoh_cpp` does without more settings: each with the router of its
@@ -209,6 +238,7 @@ impl Network {
         let environment = Environment {
             domain_id: self.domain,
             range: DiscoveryRange::Subnet,
+            static_peers: self.peers.clone(),
             ..Environment::default()
         };
         let namespace = &self.hosts[self.place(host)].1;
@@ -235,6 +265,7 @@ impl Network {
             .env_remove("ROS_AUTOMATIC_DISCOVERY_RANGE")
             .env_remove("ROS_LOCALHOST_ONLY")
             .env_remove("RUST_LOG")
+            .env("ROS_STATIC_PEERS", self.peers.join(";"))
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
@@ -251,6 +282,11 @@ impl Network {
         }
         Process::start(command)
     }
+}
+
+/// The address of the host at a place.
+fn address(place: usize) -> String {
+    format!("10.77.0.{}", place + 1)
 }
 
 fn tap() -> Result<SyncDevice, String> {

@@ -104,6 +104,8 @@ struct State {
     number: u64,
     rng: Pcg64Mcg,
     counts: Counts,
+    /// Frames to a group of hosts go nowhere.
+    drops_multicast: bool,
 }
 
 struct Shared {
@@ -141,6 +143,7 @@ impl Switch {
                 number: 0,
                 rng: Pcg64Mcg::seed_from_u64(seed),
                 counts: Counts::default(),
+                drops_multicast: false,
             }),
             changed: Condvar::new(),
             stop: AtomicBool::new(false),
@@ -165,6 +168,11 @@ impl Switch {
     /// Cuts a host's link, or mends it.
     pub fn cut(&self, place: usize, is_cut: bool) {
         self.shared.state().links[place].is_cut = is_cut;
+    }
+
+    /// Drops frames to groups of hosts from now on; those to all hosts, which ask for addresses, go on.
+    pub fn drop_multicast(&self) {
+        self.shared.state().drops_multicast = true;
     }
 
     /// What it did so far.
@@ -212,6 +220,11 @@ impl State {
         let (Some(to), Some(source)) = (frame.get(..6), frame.get(6..12)) else {
             return false;
         };
+        let is_to_group = to[0] & 1 == 1 && *to != [0xff; 6];
+        if self.drops_multicast && is_to_group {
+            self.counts.lost += 1;
+            return false;
+        }
         let address = |bytes: &[u8]| <[u8; 6]>::try_from(bytes).unwrap();
         self.places.insert(address(source), from);
         let known = self.places.get(&address(to)).copied();

@@ -38,7 +38,7 @@ impl Counting {
             {
                 return Err(format!(
                     "--reference {axis}={}: the errors of {axis} in the table reach from {} to {}: \
-                     name a position in there, or keep the errors as they were measured (--absolute)",
+                     name a position in there, or count from no reference point (--absolute)",
                     shown(axis, at).0,
                     shown(axis, first).0,
                     in_unit(axis, last)
@@ -52,7 +52,7 @@ impl Counting {
     pub fn zero(&self, axis: Axis, (first, last): (f64, f64)) -> String {
         if !self.relative_to_reference {
             return format!(
-                "errors of {axis} as they were measured (--absolute): at the reference point there may be one"
+                "errors of {axis} are not counted from the reference point (--absolute): there may be one at it"
             );
         }
         let wanted = self.reference[axis];

@@ -52,63 +52,100 @@ fn of_linear(test: &LinearTest) -> Option<(PositioningTable, String)> {
         && test.reference == Reference::Length
         && !test.compensated;
     let axis = test.axis.filter(|_| is_wanted)?;
-    let both = [&test.up_mm, &test.down_mm];
-    of_means(axis, &test.targets_mm, both, test.first_run)
+    Means {
+        axis,
+        targets: &test.targets_mm,
+        sides: [&test.up_mm, &test.down_mm],
+        mean: test.mean_mm,
+        first_run: test.first_run,
+    }
+    .table()
 }
 
 fn of_rotary(test: &RotaryTest) -> Option<(PositioningTable, String)> {
-    let both = [&test.up_rad, &test.down_rad];
     let axis = Some(test.axis).filter(|_| test.has_readings)?;
-    of_means(axis, &test.targets_rad, both, test.first_run)
-}
-
-/// The table of the means of runs up and down; of one direction alone both sides are that one.
-fn of_means(
-    axis: Axis,
-    targets: &[f64],
-    [up, down]: [&Vec<Vec<f64>>; 2],
-    first_run: u32,
-) -> Option<(PositioningTable, String)> {
-    let means = [means(up, targets.len()), means(down, targets.len())];
-    let (deviation_up, deviation_down, sides) = match means {
-        [Some(up), Some(down)] => (up, down, "up and down"),
-        [Some(up), None] => (
-            up.clone(),
-            up,
-            "up alone, so that its lost motion is not in it,",
-        ),
-        [None, Some(down)] => (
-            down.clone(),
-            down,
-            "down alone, so that its lost motion is not in it,",
-        ),
-        [None, None] => return None,
-    };
-    let n_runs = up.len().max(down.len());
-    let said = format!(
-        "positioning of {axis}: means {sides} of {n_runs} runs (run {first_run} on) of an external reference at {} targets, as read and not corrected to 20 °C",
-        targets.len()
-    );
-    let table = PositioningTable {
-        at: Stamp::from_nanos(0),
+    Means {
         axis,
-        position: targets.to_vec(),
-        deviation_up,
-        deviation_down,
-        n_runs: u32::try_from(n_runs).unwrap_or(u32::MAX),
-        weight: 0.0,
-        sequence: 0,
-    };
-    Some((table, said))
+        targets: &test.targets_rad,
+        sides: [&test.up_rad, &test.down_rad],
+        mean: test.mean_rad,
+        first_run: test.first_run,
+    }
+    .table()
 }
 
-/// Means over the runs at each of `n` targets; none without a run or a target.
-fn means(runs: &[Vec<f64>], n: usize) -> Option<Vec<f64>> {
+/// Most that an axis is off at its zero, mm and rad: zeros of reference and axis that differ by more are different ones.
+const SAME_ZERO: [f64; 2] = [1.0, 0.01];
+
+/// What a table is made of, in mm or rad.
+struct Means<'a> {
+    axis: Axis,
+    targets: &'a [f64],
+    /// Deviations per run and target, up and down, the mean of all taken out.
+    sides: [&'a Vec<Vec<f64>>; 2],
+    /// That mean.
+    mean: f64,
+    first_run: u32,
+}
+
+impl Means<'_> {
+    /// The table of the means of runs up and down; of one direction alone both sides are that one.
+    fn table(&self) -> Option<(PositioningTable, String)> {
+        let [up, down] = self.sides;
+        let (zero, of_zero) = self.zero();
+        let means = self.sides.map(|side| means(side, self.targets.len(), zero));
+        let (deviation_up, deviation_down, sides) = match means {
+            [Some(up), Some(down)] => (up, down, "up and down"),
+            [Some(up), None] => (
+                up.clone(),
+                up,
+                "up alone, so that its lost motion is not in it,",
+            ),
+            [None, Some(down)] => (
+                down.clone(),
+                down,
+                "down alone, so that its lost motion is not in it,",
+            ),
+            [None, None] => return None,
+        };
+        let (axis, first_run, n) = (self.axis, self.first_run, self.targets.len());
+        let n_runs = up.len().max(down.len());
+        let said = format!(
+            "positioning of {axis}: means {sides} of {n_runs} runs (run {first_run} on) of an external reference at {n} targets, {of_zero} and not corrected to 20 °C"
+        );
+        let table = PositioningTable {
+            at: Stamp::from_nanos(0),
+            axis,
+            position: self.targets.to_vec(),
+            deviation_up,
+            deviation_down,
+            n_runs: u32::try_from(n_runs).unwrap_or(u32::MAX),
+            weight: 0.0,
+            sequence: 0,
+        };
+        Some((table, said))
+    }
+
+    /// From what the deviations are counted: what is added to them, and its words.
+    fn zero(&self) -> (f64, &'static str) {
+        let is_linear = self.axis.is_linear();
+        if self.mean.abs() <= SAME_ZERO[usize::from(!is_linear)] {
+            return (self.mean, "as read");
+        }
+        (
+            0.0,
+            "counted from the mean of all, for the reference was zeroed at another place than the axis,",
+        )
+    }
+}
+
+/// Means over the runs at each of `n` targets from `zero`; none without a run or a target.
+fn means(runs: &[Vec<f64>], n: usize, zero: f64) -> Option<Vec<f64>> {
     let all_have = runs.iter().all(|run| run.len() == n);
     if runs.is_empty() || n == 0 || !all_have {
         return None;
     }
-    let mean = |k: usize| runs.iter().map(|run| run[k]).sum::<f64>() / runs.len() as f64;
+    let mean = |k: usize| zero + runs.iter().map(|run| run[k]).sum::<f64>() / runs.len() as f64;
     Some((0..n).map(mean).collect())
 }
 
@@ -131,6 +168,8 @@ mod tests {
             targets_mm: vec![0.0, 42.0, 83.0],
             up_mm: vec![vec![0.001, 0.002, 0.003], vec![0.003, 0.004, 0.005]],
             down_mm: vec![vec![-0.001, -0.002, -0.003], vec![-0.003, -0.002, -0.001]],
+            mean_mm: 0.0,
+            outlying: Default::default(),
             left_out: vec![],
             compensated,
             longest_rest: None,
@@ -171,6 +210,30 @@ mod tests {
         };
         assert!(tables(&other, &mut measured)[Axis::X].is_none());
         assert_eq!(measured.tables[Axis::X], learned);
+    }
+
+    #[test]
+    fn deviations_are_as_read_where_both_zeros_are_one_and_from_their_mean_where_not() {
+        let mut one = laser(Axis::X, Reference::Length, false);
+        one.mean_mm = -0.0016;
+        let (table, said) = of_linear(&one).unwrap();
+        assert!((table.deviation_up[0] - 0.0004).abs() < 1e-12, "{table:?}");
+        assert!(
+            (table.deviation_down[2] + 0.0036).abs() < 1e-12,
+            "{table:?}"
+        );
+        assert!(
+            said.ends_with("as read and not corrected to 20 °C"),
+            "{said}"
+        );
+        // The laser counts from the begin of the travel.
+        one.mean_mm = 280.0;
+        let (table, said) = of_linear(&one).unwrap();
+        assert!((table.deviation_up[0] - 0.002).abs() < 1e-12, "{table:?}");
+        assert!(
+            said.contains("counted from the mean of all") && !said.contains("as read"),
+            "{said}"
+        );
     }
 
     #[test]

@@ -146,8 +146,11 @@ impl Add {
             let paths = [path.to_owned()];
             let found =
                 diagnose::of(&paths, &name, &text, &GapConfig::default()).context("diagnosis")?;
-            is_whole &= self.add_gap(&found.json()?, origin, store)?;
+            is_whole &= self.add_gap(&found.json()?, origin, store)? && found.omitted.is_empty();
         }
-        Ok(is_whole && tests.reading.is_whole())
+        for run in &tests.not_evaluated {
+            complain!("abbe: {run}");
+        }
+        Ok(is_whole && tests.is_whole())
     }
 }

@@ -12,8 +12,11 @@ use history::{
     crossing, since_last_change,
 };
 use node_runtime::{complain, text_file};
+use reports::Report;
 use reports::evaluate::limits::Limits;
 use reports::evaluate::limits::alarms::{Judged, Observed, State};
+use reports::evaluate::limits::of_axis;
+use reports::screen::{Tile, Tone};
 use reports::section::{Rows, Section, head};
 use reports::terminal::Rank;
 use serde_json::{Value, json};
@@ -150,7 +153,7 @@ impl Alarms {
     ) -> Result<Self> {
         let mut rows = Vec::new();
         for series in store.series(key)? {
-            if !limits.has(&series.machine, &series.name, &series.axis) {
+            if !limits.has(&series.machine, &series.name, &axis_of(&series)) {
                 continue;
             }
             let kept = store.points(series.id, window)?;
@@ -188,12 +191,7 @@ impl Alarms {
     /// For a page.
     pub fn section(&self) -> Section {
         let mut section = Section::new("Limits").ranked(Rank::Answer);
-        let n = self.raised().count();
-        section.answers.push(match (n, self.rows.len()) {
-            (_, 0) => "no figure here has a limit.".to_owned(),
-            (0, all) => format!("none of {all} figures with a limit exceeds it."),
-            (n, all) => format!("ALARM: {n} of {all} figures with a limit exceed it."),
-        });
+        section.answers.push(self.in_short());
         for line in self.lines() {
             section.warn("Alarm", line);
         }
@@ -231,6 +229,38 @@ impl Alarms {
         });
         section.figures = self.json();
         section
+    }
+
+    fn in_short(&self) -> String {
+        match (self.raised().count(), self.rows.len()) {
+            (_, 0) => "no figure here has a limit.".to_owned(),
+            (0, all) => format!("none of {all} figures with a limit exceeds it."),
+            (n, all) => format!("ALARM: {n} of {all} figures with a limit exceed it."),
+        }
+    }
+
+    /// Adds the limits to a report: their part, a tile, and the alarms to its verdict and to what failed.
+    pub fn add_to(&self, report: &mut Report) {
+        report.add("alarms", &self.section());
+        let (n, all) = (self.raised().count(), self.rows.len());
+        if all == 0 {
+            return;
+        }
+        let screen = &mut report.screen;
+        let tile =
+            |value: String| Tile::new("figures with a limit", value, "the table Limits has each");
+        if n == 0 {
+            let tile = tile(format!("{all} of {all} within"));
+            screen.tiles.insert(0, tile.toned(Tone::Good));
+            return;
+        }
+        let tile = tile(format!("{n} of {all} exceed it"));
+        screen.tiles.insert(0, tile.toned(Tone::Bad));
+        screen.lacks.splice(0..0, self.lines());
+        if let Some((sentence, tone)) = &mut screen.verdict {
+            *sentence = format!("{} {sentence}", self.in_short());
+            *tone = Tone::Bad;
+        }
     }
 
     /// For machines.
@@ -348,10 +378,19 @@ impl Row {
     }
 }
 
+/// The axis of a series: its own, or the one that its test's title names.
+fn axis_of(series: &Series) -> String {
+    if !series.axis.is_empty() {
+        return series.axis.clone();
+    }
+    of_axis::named_in(&series.test).map_or(String::new(), |axis| axis.to_string())
+}
+
 fn judged(limits: &Limits, series: Series, point: Point, source: &str) -> Result<Option<Row>> {
+    let axis = axis_of(&series);
     let observed = Observed {
         name: &series.name,
-        axis: &series.axis,
+        axis: &axis,
         unit: &series.unit,
         value: point.value,
         standard_uncertainty: point.standard_uncertainty,
@@ -402,6 +441,8 @@ fn expected(judged: &Judged, points: &[Point]) -> String {
 #[cfg(test)]
 mod tests {
     use history::{Entry, Kind, Options};
+    use reports::ReportKind;
+    use reports::evidence::Evidence;
 
     use super::*;
 
@@ -456,6 +497,42 @@ mod tests {
             let text = alarms.section().terminal();
             assert_eq!(text.contains("ALARM: m: "), is_alarm, "{text}");
             assert!(text.contains("≤ 10.00 µm"), "{text}");
+            let mut report = Report::of(ReportKind::Tests, "t", &Evidence::default()).unwrap();
+            report.screen.verdict = Some(("Smaller.".to_owned(), Tone::Good));
+            alarms.add_to(&mut report);
+            let (verdict, tone) = report.screen.verdict.clone().unwrap();
+            assert_eq!(verdict.starts_with("ALARM: 1 of 1 "), is_alarm, "{verdict}");
+            assert_eq!(tone == Tone::Bad, is_alarm);
+            assert_eq!(report.screen.tiles[0].tone == Tone::Bad, is_alarm);
+            assert_eq!(report.screen.lacks.len(), usize::from(is_alarm));
+        }
+    }
+
+    #[test]
+    fn a_figure_whose_test_names_its_axis_is_held_against_the_limits_of_the_axis() {
+        let text = "rule: simple\nlimits:\n  iso230_2.accuracy: {upper_um: 20.0}\n  iso230_2.accuracy X: {upper_um: 5.0}\n";
+        for (test, n_alarms) in [
+            ("Positioning X: not compensated", 1),
+            ("Positioning Y", 0),
+            ("Circle XY", 0),
+        ] {
+            let figures = [Figure {
+                test: test.to_owned(),
+                name: "iso230_2.accuracy".to_owned(),
+                axis: String::new(),
+                value: 0.008,
+                unit: "mm".to_owned(),
+                ..play(0.0)
+            }];
+            let measured = Measured {
+                machine: "m",
+                at_s: 86_400.0,
+                source: "bag",
+                figures: &figures,
+            };
+            let limits = Limits::read(text, Path::new("limits.yaml")).unwrap();
+            let alarms = Alarms::of_figures(limits, &measured).unwrap();
+            assert_eq!(alarms.lines().len(), n_alarms, "{test}");
         }
     }
 

@@ -1,6 +1,7 @@
 //! Figures in the units in which people read them.
 
 use history::Series;
+use reports::positioning::shown_title;
 use reports::section;
 
 /// A unit for people.
@@ -95,7 +96,7 @@ pub fn title(series: &Series) -> String {
     if series.test.is_empty() {
         return format!("{}{axis}", series.name);
     }
-    format!("{}{axis}, {}", series.name, series.test)
+    format!("{}{axis}, {}", series.name, shown_title(&series.test))
 }
 
 #[cfg(test)]

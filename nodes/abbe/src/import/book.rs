@@ -10,15 +10,18 @@ use std::io::{Cursor, Read};
 use anyhow::{Context, Result, bail};
 use zip::ZipArchive;
 
+use super::hidden::Hidden;
+
 /// Most parts of a workbook.
 const MOST_PARTS: usize = 2_000;
 /// Longest of all parts together, unpacked, bytes.
 const MOST_UNPACKED_BYTES: u64 = 128 << 20;
 /// Longest tag of a part, bytes.
 const LONGEST_TAG_BYTES: usize = 64 << 10;
-/// Last row and last column of a worksheet (ECMA-376).
+/// Last row of a worksheet (ECMA-376).
 const LAST_ROW: u32 = 1_048_576;
-const LAST_COLUMN: u32 = 16_384;
+/// Last column of a worksheet.
+pub const LAST_COLUMN: u32 = 16_384;
 /// Most of each list that the reader keeps whole, by the tag of an entry: an entry of 5 bytes takes ten times as many in memory.
 const MOST_OF_LIST: [(&[u8], u64); 6] = [
     (b"si", 2_000_000),
@@ -31,15 +34,15 @@ const MOST_OF_LIST: [(&[u8], u64); 6] = [
 /// Bytes that are unpacked at a time.
 const PIECE_BYTES: usize = 64 << 10;
 
-/// Checks a workbook.
+/// Checks a workbook; a line for each part with hidden rows or columns.
 ///
 /// # Errors
 /// With the part and the limit, or with the reference.
-pub fn check(bytes: &[u8]) -> Result<()> {
+pub fn check(bytes: &[u8]) -> Result<Vec<String>> {
     check_within(bytes, MOST_UNPACKED_BYTES)
 }
 
-fn check_within(bytes: &[u8], most_bytes: u64) -> Result<()> {
+fn check_within(bytes: &[u8], most_bytes: u64) -> Result<Vec<String>> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).context("xlsx")?;
     if archive.len() > MOST_PARTS {
         bail!(
@@ -48,6 +51,7 @@ fn check_within(bytes: &[u8], most_bytes: u64) -> Result<()> {
         );
     }
     let mut unpacked = 0_u64;
+    let mut hidden = vec![];
     for place in 0..archive.len() {
         let mut part = archive.by_index(place).context("xlsx")?;
         let name = part.name().context("xlsx")?.into_owned();
@@ -78,8 +82,9 @@ fn check_within(bytes: &[u8], most_bytes: u64) -> Result<()> {
             tags.take(&piece[..n])
                 .with_context(|| format!("part {name}"))?;
         }
+        hidden.extend(tags.hidden.in_words(&name));
     }
-    Ok(())
+    Ok(hidden)
 }
 
 /// Where in an XML text a scan is.
@@ -102,6 +107,7 @@ struct Tags {
     is_xml: bool,
     /// Tags of each kind of [`MOST_OF_LIST`] so far.
     entries: [u64; MOST_OF_LIST.len()],
+    hidden: Hidden,
 }
 
 impl Tags {
@@ -132,6 +138,7 @@ impl Tags {
             (None, b'>') => {
                 self.state = State::Text;
                 self.count()?;
+                self.hidden.take(&self.tag);
                 return checked(&self.tag);
             }
             (None, b'"' | b'\'') => self.state = State::Tag(Some(byte)),
@@ -173,7 +180,7 @@ impl Tags {
 }
 
 /// The name of a tag without its prefix, and what follows it.
-fn named(tag: &[u8]) -> (&[u8], &[u8]) {
+pub fn named(tag: &[u8]) -> (&[u8], &[u8]) {
     let is_blank = |byte: &u8| byte.is_ascii_whitespace() || *byte == b'/';
     let (name, rest) = tag.split_at(tag.iter().position(is_blank).unwrap_or(tag.len()));
     (
@@ -206,7 +213,7 @@ fn checked(tag: &[u8]) -> Result<()> {
 }
 
 /// The values of an attribute in what follows the name of a tag.
-fn values<'t>(mut rest: &'t [u8], key: &[u8]) -> Vec<&'t [u8]> {
+pub fn values<'t>(mut rest: &'t [u8], key: &[u8]) -> Vec<&'t [u8]> {
     let mut found = vec![];
     while let Some(equals) = rest.iter().position(|byte| *byte == b'=') {
         let name = rest[..equals].trim_ascii();
@@ -273,7 +280,7 @@ mod tests {
     }
 
     fn refused(text: &str) -> String {
-        check(&book(text)).map_or_else(|error| format!("{error:#}"), |()| String::new())
+        check(&book(text)).map_or_else(|error| format!("{error:#}"), |_| String::new())
     }
 
     #[test]

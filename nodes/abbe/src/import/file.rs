@@ -1,4 +1,4 @@
-//! The cells of a file: of a text with separators, or of a worksheet (xlsx).
+//! The cells of a file: of a text with separators, of a worksheet (xlsx), or of an instrument's own form.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -9,7 +9,8 @@ use node_runtime::text_file::{self, Comments};
 
 use super::book;
 use super::dates;
-use super::sheet::{MOST_CELLS, MOST_COLUMNS, Sheet};
+use super::instrument;
+use super::sheet::{Cells, MOST_CELLS, MOST_COLUMNS, Sheet};
 
 /// Begin of a ZIP archive, which an xlsx file is.
 const ZIP: &[u8] = b"PK\x03\x04";
@@ -31,24 +32,14 @@ pub struct Form<'m> {
     pub sheet: Option<&'m str>,
 }
 
-/// Whether a file is a worksheet.
+/// Whether the cells of a file are apart by separators, and neither a worksheet nor of an instrument's own form.
 ///
 /// # Errors
 /// When it cannot be read.
-pub fn is_worksheet(path: &Path) -> Result<bool> {
+pub fn is_separated(path: &Path) -> Result<bool> {
     let bytes = text_file::bytes(path)?;
-    Ok(bytes.starts_with(ZIP) || bytes.starts_with(OLD))
-}
-
-/// The cells of a file, and which of its worksheets they are.
-#[derive(Debug)]
-pub struct Cells {
-    /// The cells.
-    pub sheet: Sheet,
-    /// Name of the worksheet, where the file has several that hold anything.
-    pub name: Option<String>,
-    /// Which worksheet was read and which were not; nothing of a file with one.
-    pub note: Option<String>,
+    let is_worksheet = bytes.starts_with(ZIP) || bytes.starts_with(OLD);
+    Ok(!is_worksheet && instrument::of(&bytes).is_none())
 }
 
 /// Reads the cells of a file. Of several worksheets it is the one that `is_table`, of those that are shown.
@@ -67,11 +58,13 @@ pub fn read(path: &Path, form: Form<'_>, is_table: &dyn Fn(&Sheet) -> bool) -> R
     if let Some(name) = form.sheet {
         bail!("sheet = {name}: does nothing, the file is a text: remove it");
     }
+    if let Some(instrument) = instrument::of(&bytes) {
+        return instrument.cells(&bytes, form.decimal);
+    }
     let sheet = Sheet::of_text(&text_file::read(path, Comments::Csv)?, form.separator)?;
     Ok(Cells {
         sheet,
-        name: None,
-        note: None,
+        ..Cells::default()
     })
 }
 
@@ -83,7 +76,15 @@ fn of_xlsx(bytes: Vec<u8>, form: Form<'_>, is_table: &dyn Fn(&Sheet) -> bool) ->
             bytes.len()
         );
     }
-    book::check(&bytes)?;
+    let mut hidden = book::check(&bytes)?;
+    let mut cells = of_book(bytes, form, is_table)?;
+    hidden.extend(cells.note.take());
+    cells.note = (!hidden.is_empty()).then(|| hidden.join("; "));
+    Ok(cells)
+}
+
+/// The cells of a worksheet of a workbook that was checked.
+fn of_book(bytes: Vec<u8>, form: Form<'_>, is_table: &dyn Fn(&Sheet) -> bool) -> Result<Cells> {
     let mut book = Xlsx::new(Cursor::new(bytes)).context("xlsx")?;
     let names = book.sheet_names();
     if let Some(name) = form.sheet {
@@ -105,6 +106,7 @@ fn of_xlsx(bytes: Vec<u8>, form: Form<'_>, is_table: &dyn Fn(&Sheet) -> bool) ->
             sheet,
             name: Some(name.to_owned()),
             note: note(name, &others),
+            ..Cells::default()
         });
     }
     chosen(&mut book, form.decimal, is_table)
@@ -172,6 +174,7 @@ fn chosen(
         sheet,
         name: note.is_some().then_some(name),
         note,
+        ..Cells::default()
     })
 }
 
@@ -321,6 +324,19 @@ mod tests {
             said.contains("no such worksheet, it has Empty, Laser"),
             "{said}"
         );
+    }
+
+    #[test]
+    fn hidden_rows_and_columns_are_said_with_their_number() {
+        let cells = "<cols><col min='2' max='9' hidden='1'/></cols><sheetData><row r='1'><c r='A1'><v>1</v></c><c r='B1'><v>1</v></c></row><row r='2' hidden='1'><c r='A2'><v>1</v></c></row></sheetData>";
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("a.xlsx");
+        std::fs::write(&path, workbook(cells)).unwrap();
+        let note = super::read(&path, form('.'), &any).unwrap().note.unwrap();
+        let begin = "warning, xl/worksheets/sheet1.xml: 1 rows and 1 columns are hidden";
+        assert!(note.starts_with(begin), "{note}");
+        std::fs::write(&path, workbook(&numbered(7))).unwrap();
+        assert_eq!(super::read(&path, form('.'), &any).unwrap().note, None);
     }
 
     #[test]

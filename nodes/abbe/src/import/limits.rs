@@ -457,6 +457,7 @@ mod tests {
             let runs = Runs {
                 runs: vec![rows, (0..90).map(|k| row(k, f64::NAN)).collect()],
                 remarks: vec![],
+                is_order_known: true,
             };
             let found = outliers_of_circles(&runs, radius_mm, "radial_um");
             assert_eq!(found.len(), 1, "{found:?}");

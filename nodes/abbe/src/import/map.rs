@@ -401,20 +401,6 @@ const fn column(name: &str, what: What) -> Column<'_> {
 }
 
 impl Map {
-    /// The instrument's resolution with its key as a bag carries it (`params/import.yaml`), where the map states it.
-    pub fn resolution(&self) -> Option<(&'static str, f64)> {
-        let is_angle = match &self.test {
-            Test::Positioning { axis, .. } => !axis.is_linear(),
-            _ => false,
-        };
-        let key = if is_angle {
-            "resolution_arcsec"
-        } else {
-            "resolution_um"
-        };
-        self.resolution_um.map(|value| (key, value))
-    }
-
     /// Checks the columns against each other, and their units.
     ///
     /// # Errors

@@ -175,7 +175,17 @@ fn rest(position: &PerAxis<f64>, time_s: f64, writer: &mut Writer) -> Result<()>
     Ok(())
 }
 
-/// Goes along one axis, at a speed, to within what counts as one place.
+/// The place a tick later on the way to another, at a speed; what counts as one place with the end is the end.
+fn next_place(at: f64, to: f64, (step, same): (f64, f64)) -> f64 {
+    let way = to - at;
+    if way.abs() <= step + same {
+        to
+    } else {
+        at + way.signum() * step
+    }
+}
+
+/// Goes along one axis, at a speed, and stands at the end exactly: a place beside it may be another one to an evaluation.
 fn go(
     position: &mut PerAxis<f64>,
     axis: Axis,
@@ -183,14 +193,11 @@ fn go(
     (per_s, same): (f64, f64),
     writer: &mut Writer,
 ) -> Result<()> {
-    let step = per_s * TICK_S;
-    while (to - position[axis]).abs() > same {
-        let way = to - position[axis];
-        position[axis] = if way.abs() <= step {
-            to
-        } else {
-            position[axis] + way.signum() * step
-        };
+    if (to - position[axis]).abs() <= same {
+        position[axis] = to;
+    }
+    while position[axis].total_cmp(&to).is_ne() {
+        position[axis] = next_place(position[axis], to, (per_s * TICK_S, same));
         writer.tick(position)?;
         writer.wait(TICK_S);
     }
@@ -447,6 +454,34 @@ mod tests {
             cells: vec![1.0, *mm, 0.0],
         };
         check_time(&test, &[targets_mm.iter().map(row).collect()])
+    }
+
+    #[test]
+    fn a_way_ends_exactly_at_its_target_whatever_its_unit_and_decimals() {
+        let step = 1000.0 / 60.0 * TICK_S;
+        let mut n = 0;
+        for spacing_mm in [10, 20, 25, 35, 50] {
+            for decimals in [5, 6, 7, 8, 9, 15] {
+                // As a table has them: rounded in inches.
+                let size = 10.0_f64.powi(decimals);
+                let inches = (-8..8).map(|k| f64::from(k * spacing_mm) / 25.4);
+                let places: Vec<f64> = inches.map(|x| (x * size).round() / size * 25.4).collect();
+                for [from, to] in places
+                    .windows(2)
+                    .flat_map(|two| [[two[0], two[1]], [two[1], two[0]]])
+                {
+                    let mut at = from - (to - from).signum();
+                    let mut ticks = 0;
+                    while at.total_cmp(&to).is_ne() && ticks < 1000 {
+                        at = next_place(at, to, (step, SAME_TARGET_MM));
+                        ticks += 1;
+                    }
+                    assert!(at.total_cmp(&to).is_eq(), "{from} to {to}: {at}");
+                    n += 1;
+                }
+            }
+        }
+        assert_eq!(n, 5 * 6 * 30);
     }
 
     #[test]

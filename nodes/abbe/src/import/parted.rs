@@ -75,6 +75,66 @@ const MARKS: &[&str] = &[
     "reject",
     "rejected",
     "outlier",
+    "outliers",
+    "ausreißer",
+    "ausreisser",
+    "exclude",
+    "excluded",
+    "exclusion",
+    "include",
+    "included",
+    "use",
+    "used",
+    "verwendet",
+    "verwenden",
+    "weight",
+    "weights",
+    "gewicht",
+    "skip",
+    "skipped",
+    "ignore",
+    "ignored",
+    "omit",
+    "omitted",
+    "discard",
+    "discarded",
+    "accept",
+    "accepted",
+    "keep",
+    "kept",
+    "good",
+    "masked",
+];
+/// Words before them that say nothing.
+const BEFORE_MARKS: &[&str] = &["is", "row", "point", "data", "reading", "to", "be", "not"];
+/// First words of columns of notes, in which a sign alone marks a row.
+const NAMES_OF_NOTES: &[&str] = &[
+    "note",
+    "notes",
+    "remark",
+    "remarks",
+    "comment",
+    "comments",
+    "bemerkung",
+    "kommentar",
+    "mark",
+];
+/// Notes that mark their row, lower case.
+const MARKING: &[&str] = &[
+    "x",
+    "bad",
+    "exclude",
+    "excluded",
+    "outlier",
+    "reject",
+    "rejected",
+    "invalid",
+    "ignore",
+    "ignored",
+    "discard",
+    "discarded",
+    "ausreißer",
+    "ungültig",
 ];
 /// Those whose numbers are codes.
 const CODES: &[&str] = &[
@@ -122,8 +182,10 @@ pub fn check(map: &Map, head: &[String], lines: &Lines, rows: &[Row]) -> Result<
                 })
             })
             .collect();
-        if is_first(name, MARKS) {
+        if is_mark(name) {
             marked(name, &cells, map.decimal)?;
+        } else if is_first(name, NAMES_OF_NOTES) {
+            noted(name, &cells)?;
         } else if !is_log && is_of_a_test(name) {
             parted(name, &cells, (run.is_some(), map.decimal))?;
         }
@@ -143,6 +205,39 @@ fn is_first(name: &str, whole: &[&str]) -> bool {
     let words = words(name);
     let first = words.first();
     first.is_some_and(|first| whole.contains(&first.as_str()))
+}
+
+/// Whether a name is that of a column that marks rows.
+fn is_mark(name: &str) -> bool {
+    let words = words(name);
+    let mut own = words.iter().map(String::as_str);
+    let first = own.find(|word| !BEFORE_MARKS.contains(word));
+    first.is_some_and(|first| MARKS.contains(&first))
+}
+
+/// Refuses a column of notes in which a sign or a word alone marks a row.
+fn noted(name: &str, cells: &[Cell<'_>]) -> Result<()> {
+    let is_marking = |text: &str| {
+        let is_sign = |letter: char| !letter.is_alphanumeric() && !matches!(letter, '-' | '.');
+        MARKING.contains(&text.to_lowercase().as_str())
+            || (!text.is_empty() && text.chars().all(is_sign))
+    };
+    let odd = cells.iter().find(|cell| is_marking(cell.text));
+    match odd.filter(|_| !cells.iter().all(|cell| is_marking(cell.text))) {
+        Some(odd) => bail!("{}", refusal(odd, name, "other text in other rows")),
+        None => Ok(()),
+    }
+}
+
+/// Why rows that a table marks itself are refused.
+fn refusal(odd: &Cell<'_>, name: &str, others: &str) -> String {
+    format!(
+        "line {}, column \"{}\": \"{}\", and {others}: the table marks rows itself: remove those that do not count, and \
+         the column with them",
+        odd.line,
+        shown(name),
+        shown(odd.text)
+    )
 }
 
 /// Whether a name is that of what a whole test has.
@@ -200,14 +295,8 @@ fn marked(name: &str, cells: &[Cell<'_>], decimal: char) -> Result<()> {
     let Some(odd) = cells.iter().find(|cell| Some(cell.text) != usual) else {
         return Ok(());
     };
-    bail!(
-        "line {}, column \"{}\": \"{}\", and \"{}\" in most rows: the table marks rows itself: remove those that do not count, and \
-         the column with them",
-        odd.line,
-        shown(name),
-        shown(odd.text),
-        shown(usual.unwrap_or_default())
-    );
+    let others = format!("\"{}\" in most rows", shown(usual.unwrap_or_default()));
+    bail!("{}", refusal(odd, name, &others))
 }
 
 fn parted(name: &str, cells: &[Cell<'_>], (has_runs, decimal): (bool, char)) -> Result<()> {
@@ -253,6 +342,22 @@ mod tests {
     use super::super::sheet::Sheet;
     use super::super::table::Table;
     use super::*;
+
+    #[test]
+    fn columns_that_mark_no_row_are_taken() {
+        let taken = |name: &str, values: [&str; 3]| {
+            let cell = |run: u32, target: u32| values[((run + target) % 3) as usize].to_owned();
+            assert_eq!(refusal("run: n, ", name, cell), "", "{name}");
+        };
+        taken("excluded", ["", "", ""]);
+        taken("use", ["yes", "yes", "yes"]);
+        taken("weight", ["12.5", "11", "12"]);
+        taken("note", ["slow", "", "with the door open"]);
+        taken("remark", ["-", "", "-"]);
+        taken("comment", ["*", "*", "*"]);
+        taken("user", ["anna", "ben", ""]);
+        taken("usage", ["1", "0", "1"]);
+    }
 
     /// The refusal of three runs over six targets with another column; `cell` by run and target.
     fn refusal(keys: &str, name: &str, cell: impl Fn(u32, u32) -> String) -> String {
@@ -310,6 +415,21 @@ mod tests {
             ("fehlercode", "17"),
             ("beam", "0"),
             ("beam strength", "lost"),
+            ("excluded", "x"),
+            ("Excluded?", "yes"),
+            ("is outlier", "true"),
+            ("use", "no"),
+            ("used", "0"),
+            ("include", "0"),
+            ("weight", "0"),
+            ("Gewicht", "0"),
+            ("skip row", "x"),
+            ("not used", "x"),
+            ("point accepted", "n"),
+            ("note", "*"),
+            ("Bemerkung", "x"),
+            ("remark", "outlier"),
+            ("comment", "!!"),
         ] {
             let value = |run, target| if (run, target) == (2, 3) { bad } else { "1" }.to_owned();
             let refused = refusal("run: n, ", name, value);

@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 
 use anyhow::{Result, bail};
 
-use super::runs::{GRID_MM, gathered, ways};
+use super::returns;
+use super::runs::{GRID_MM, Runs, gathered, ways};
 use super::table::Row;
 
 /// Runs that are named one by one.
@@ -134,7 +135,15 @@ pub fn are_rows(runs: &[Vec<Row>]) -> bool {
 ///
 /// # Errors
 /// With the line where the rows are neither in the order of the measurement nor have a column of the direction.
-pub fn repetitions(rows: Vec<Row>) -> Result<(Vec<Vec<Row>>, String)> {
+pub fn repetitions(rows: Vec<Row>) -> Result<Runs> {
+    let is_told = rows.first().is_some_and(|row| row.cells.len() > 3);
+    if let Some((runs, remark)) = returns::apart(&rows).filter(|_| !is_told) {
+        return Ok(Runs {
+            runs,
+            remarks: vec![remark],
+            is_order_known: true,
+        });
+    }
     let mut visits: BTreeMap<(i64, bool), f64> = BTreeMap::new();
     let ways = ways(&rows);
     let mut numbered = vec![];
@@ -157,15 +166,20 @@ pub fn repetitions(rows: Vec<Row>) -> Result<(Vec<Vec<Row>>, String)> {
         None => {
             let runs = numbered.chunk_by(|a, b| a.cells[0].total_cmp(&b.cells[0]).is_eq());
             let runs = runs.map(<[Row]>::to_vec).collect();
-            Ok((runs, format!("no number of a run: {by_number}")))
+            Ok(Runs {
+                runs,
+                remarks: vec![format!("no number of a run: {by_number}")],
+                is_order_known: true,
+            })
         }
-        Some((_, true)) => Ok((
-            gathered(&numbered),
-            format!(
+        Some((_, true)) => Ok(Runs {
+            runs: gathered(&numbered),
+            remarks: vec![format!(
                 "no number of a run: {by_number}. The rows are not in the order of whole runs; they were gathered by run, upwards first and then \
                  downwards, and how long a stop came after another is not known"
-            ),
-        )),
+            )],
+            is_order_known: false,
+        }),
         Some((line, false)) => bail!(
             "line {line}: a target comes again before the run ends, and the runs cannot be separated: name a column of the run or of the direction in the map"
         ),
@@ -289,13 +303,14 @@ mod tests {
             cells: [&[1.0][..], &row.cells[1..]].concat(),
         };
         let rows: Vec<Row> = wanted.iter().flatten().map(unnumbered).collect();
-        assert_eq!(repetitions(rows.clone()).unwrap().0, wanted);
+        assert_eq!(repetitions(rows.clone()).unwrap().runs, wanted);
         // Sorted by target: a step cycle, or a sheet that somebody sorted.
         let mut sorted = rows.clone();
         sorted.sort_by(|a, b| a.cells[1].total_cmp(&b.cells[1]));
-        let (runs, said) = repetitions(sorted.clone()).unwrap();
-        assert_eq!(runs, wanted);
-        assert!(said.contains("gathered"), "{said}");
+        let found = repetitions(sorted.clone()).unwrap();
+        assert_eq!(found.runs, wanted);
+        let said = &found.remarks[0];
+        assert!(said.contains("gathered") && !found.is_order_known, "{said}");
         // In the order of the measurement no column of the direction is needed, sorted one is.
         let bare = |rows: &[Row]| -> Vec<Row> {
             let cut = |row: &Row| Row {
@@ -305,7 +320,7 @@ mod tests {
             rows.iter().map(cut).collect()
         };
         assert_eq!(
-            readings(&repetitions(bare(&rows)).unwrap().0),
+            readings(&repetitions(bare(&rows)).unwrap().runs),
             readings(&wanted)
         );
         assert!(repetitions(bare(&sorted)).is_err());

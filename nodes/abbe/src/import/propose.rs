@@ -5,13 +5,11 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use metrology::Axis;
-use node_runtime::text_file::{self, Comments};
 
-use super::file::{self, Form};
 use super::map::{Direction, Map, Plane, Test, units};
-use super::recognise::{self, Known, Recognised, Role};
+use super::pass_names;
+use super::recognise::{Known, Recognised, Role};
 use super::separators;
-use super::sheet::Sheet;
 use super::stated::{in_one_line, quoted};
 use super::times;
 use super::units::{Kind, Unit};
@@ -27,6 +25,8 @@ pub struct Proposal {
     pub recognised: Vec<String>,
     /// What the table lacks, a line each.
     pub needed: Vec<String>,
+    /// Keys whose values are assumed.
+    pub assumed: Vec<String>,
 }
 
 /// Proposes a map for a table.
@@ -34,12 +34,20 @@ pub struct Proposal {
 /// # Errors
 /// When the file cannot be read, or none of its columns is recognised.
 pub fn of(path: &Path) -> Result<Proposal> {
-    let (found, sheet) = looked_at(path)?;
-    let found = found.with_context(|| separators::no_names(path))?;
+    let looked = looked::at(path)?;
+    let found = looked.found.with_context(|| separators::no_names(path))?;
     let stem = path.file_stem().map(|stem| stem.to_string_lossy());
     let axis = found.axis(&stem.unwrap_or_default());
     let mut text = Text::new(&found, path);
-    if let Some(name) = sheet {
+    text.start_s = looked.start_s.unwrap_or(0.0);
+    if let Some(form) = looked.form {
+        text.recognised = vec![format!(
+            "{}: {form}, {} readings",
+            path.display(),
+            found.n_rows
+        )];
+    }
+    if let Some(name) = looked.sheet {
         let _ = writeln!(text.head, "sheet: {}", quoted(&name));
         text.recognised.push(format!("sheet: \"{name}\""));
     }
@@ -47,36 +55,14 @@ pub fn of(path: &Path) -> Result<Proposal> {
         Some(Of::Positioning) => text.positioning(axis)?,
         Some(Of::Log) => text.log(axis)?,
         Some(Of::Circle) => text.circle()?,
-        None => bail!(
-            "{}columns {}: neither targets with deviations, nor a time with a displacement, nor angles with radial deviations: write a map (docs/reference/scenario.md#import-map)",
-            sign::unsure(&found),
-            names(&found).join(", ")
-        ),
+        None => bail!("{}", nothing::in_words(&found)),
     };
     Ok(Proposal {
         map: text.finished(),
         recognised: text.recognised,
         needed: text.needed,
+        assumed: text.assumed,
     })
-}
-
-/// What is in a file, and the name of its worksheet where it has several.
-fn looked_at(path: &Path) -> Result<(Option<Recognised>, Option<String>)> {
-    let form = Form {
-        separator: ',',
-        decimal: '.',
-        sheet: None,
-    };
-    if !file::is_worksheet(path)? {
-        let found = recognise::of_text(&text_file::read(path, Comments::Csv)?)?;
-        return Ok((found, None));
-    }
-    let is_table = |sheet: &Sheet| {
-        let found = recognise::of(sheet, form.decimal);
-        found.is_some_and(|found| kind(&found).is_some())
-    };
-    let cells = file::read(path, form, &is_table)?;
-    Ok((recognise::of(&cells.sheet, form.decimal), cells.name))
 }
 
 /// Kinds of tests.
@@ -116,6 +102,7 @@ struct Text<'t> {
     start_s: f64,
     recognised: Vec<String>,
     needed: Vec<String>,
+    assumed: Vec<String>,
 }
 
 impl<'t> Text<'t> {
@@ -149,21 +136,42 @@ impl<'t> Text<'t> {
             start_s: 0.0,
             recognised: vec![said],
             needed: vec![],
+            assumed: vec![],
         }
     }
 
     /// Names a column under a key.
     fn column(&mut self, key: &str, column: &Known) {
-        self.used.push(column.name.clone());
         let _ = writeln!(self.test, "    {key}: {}", quoted(&column.name));
-        self.recognised
-            .push(format!("{key}: column \"{}\"", column.name));
+        self.note(key, column);
+    }
+
+    /// Notes which column gave what a key holds.
+    fn note(&mut self, key: &str, column: &Known) {
+        self.used.push(column.name.clone());
+        let name = &column.name;
+        self.recognised.push(format!("{key}: column \"{name}\""));
+    }
+
+    /// Names the column that is read under a key, and says which other ones fit as well.
+    fn read(&mut self, key: &str, column: &Known) {
+        self.column(key, column);
+        let others = self.found.as_plain(column);
+        let others: Vec<String> = others.map(|other| format!("\"{}\"", other.name)).collect();
+        if !others.is_empty() {
+            self.needed.push(format!(
+                "column \"{}\": read as {key}, and {} by name could be it as well: name the one that is meant in a map",
+                column.name,
+                others.join(", ")
+            ));
+        }
     }
 
     /// Lists what the table lacks.
     fn stated(&mut self, key: &str, value: &str, why: &str) {
         let _ = writeln!(self.test, "    {key}: {value}  # NEEDED: {why}");
         self.needed.push(format!("{key} = {value}: {why}"));
+        self.assumed.push(key.to_owned());
     }
 
     /// States the unit of a column that is read in `wanted`; of one without a unit that cannot be right the `likely` one.
@@ -253,7 +261,7 @@ impl<'t> Text<'t> {
             "1.0",
             "how far it turned round beyond an end; figures do not depend on it",
         );
-        self.column(key("target_mm", "target_deg"), target);
+        self.read(key("target_mm", "target_deg"), target);
         self.unit(target, place, likely_target(target, place))?;
         if self.readings(taken)? {
             return Ok(());
@@ -286,11 +294,11 @@ impl<'t> Text<'t> {
         match (found.first(Role::Deviation), found.first(Role::Measured)) {
             (Some(read), _) => {
                 sign::check(found, read)?;
-                self.column(key("deviation_um", "deviation_arcsec"), read);
+                self.read(key("deviation_um", "deviation_arcsec"), read);
                 self.unit(read, deviation, likely_deviation(&[read], deviation))?;
             }
             (None, Some(read)) => {
-                self.column(key("measured_mm", "measured_deg"), read);
+                self.read(key("measured_mm", "measured_deg"), read);
                 let likely = likely_target(read, place);
                 self.unit(read, place, likely)?;
             }
@@ -300,6 +308,7 @@ impl<'t> Text<'t> {
     }
 
     fn passes(&mut self, passes: &[(&Known, Direction)], key: &str, wanted: Unit) -> Result<()> {
+        pass_names::check(self.found)?;
         let _ = writeln!(self.test, "    {key}:");
         let columns: Vec<&Known> = passes.iter().map(|(column, _)| *column).collect();
         let likely = likely_deviation(&columns, wanted);
@@ -308,11 +317,9 @@ impl<'t> Text<'t> {
                 Direction::Up => "up",
                 Direction::Down => "down",
             };
-            self.used.push(column.name.clone());
             let name = quoted(&column.name);
             let _ = writeln!(self.test, "      - {{column: {name}, direction: {word}}}");
-            self.recognised
-                .push(format!("pass {word}: column \"{}\"", column.name));
+            self.note(&format!("pass {word}"), column);
             self.unit(column, wanted, likely)?;
         }
         Ok(())
@@ -353,7 +360,7 @@ impl<'t> Text<'t> {
             Some(first_s) => self.start_s = first_s,
             None => self.time_unit(time)?,
         }
-        self.column("displacement_um", read);
+        self.read("displacement_um", read);
         self.unit(read, Unit::Um, likely_deviation(&[read], Unit::Um))?;
         if let Some(run) = found.first(Role::Run) {
             self.column("run", run);
@@ -368,9 +375,7 @@ impl<'t> Text<'t> {
                 continue;
             }
             let _ = writeln!(self.test, "      {id}: {}", quoted(&column.name));
-            self.used.push(column.name.clone());
-            self.recognised
-                .push(format!("temperature_degc.{id}: column \"{}\"", column.name));
+            self.note(&format!("temperature_degc.{id}"), column);
             self.unit(column, Unit::Degc, None)?;
             sensors.push(id);
         }
@@ -389,6 +394,9 @@ impl<'t> Text<'t> {
         }
         let first = time.numbers.first().copied().unwrap_or(0.0);
         let named = time.unit.filter(|unit| unit.kind() == Kind::Time);
+        if named.is_none() {
+            self.needed.extend(epochs::check(time, first)?);
+        }
         let of_epoch = || {
             let (word, _) = metrology::epoch::likely_unit(first)?;
             match word {
@@ -447,9 +455,7 @@ impl<'t> Text<'t> {
         match nominal {
             Some((column, radius_mm)) => {
                 let _ = writeln!(self.test, "    radius_mm: {radius_mm:?}");
-                self.recognised
-                    .push(format!("radius_mm: column \"{}\"", column.name));
-                self.used.push(column.name.clone());
+                self.note("radius_mm", column);
             }
             None => self.stated(
                 "radius_mm",
@@ -460,9 +466,7 @@ impl<'t> Text<'t> {
         match radial::feed(found) {
             Some((column, feed_mm_min)) => {
                 let _ = writeln!(self.test, "    feed_mm_min: {feed_mm_min:?}");
-                self.recognised
-                    .push(format!("feed_mm_min: column \"{}\"", column.name));
-                self.used.push(column.name.clone());
+                self.note("feed_mm_min", column);
             }
             None => self.stated(
                 "feed_mm_min",
@@ -471,9 +475,9 @@ impl<'t> Text<'t> {
             ),
         }
         self.column("run", run);
-        self.column("angle_deg", angle);
+        self.read("angle_deg", angle);
         self.unit(angle, Unit::Deg, None)?;
-        self.column("radial_um", read);
+        self.read("radial_um", read);
         self.unit(read, Unit::Um, likely_deviation(&[read], Unit::Um))?;
         Ok(())
     }
@@ -485,6 +489,7 @@ impl<'t> Text<'t> {
             let _ = writeln!(map, "start_s: {:.0}", self.start_s.floor());
         } else {
             map.push_str("start_s: 0  # NEEDED: when the measurement began, s since 1970\n");
+            self.assumed.push("start_s".to_owned());
             self.needed
                 .push("start_s: when the measurement began, s since 1970".to_owned());
         }
@@ -579,7 +584,12 @@ pub fn machine_for(map: &Map) -> String {
     text
 }
 
+#[cfg(test)]
+mod cells;
+mod epochs;
 mod likely;
+mod looked;
+mod nothing;
 mod radial;
 mod sign;
 #[cfg(test)]

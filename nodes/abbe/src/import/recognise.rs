@@ -5,12 +5,16 @@ use metrology::Axis;
 
 use super::beside;
 use super::map::{Direction, Plane};
+use super::odd::is_missing;
+use super::pass_names;
+use super::quantities;
 use super::sheet::Sheet;
 use super::stated::{self, Stated};
 use super::table::number_of;
 use super::times;
 use super::units::{Kind, Unit};
-use super::vocabulary::{is_correction, is_reversed};
+use super::unread;
+use super::vocabulary::{is_correction, is_reversed, words};
 
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +47,18 @@ pub struct Known {
     pub numbers: Vec<f64>,
     /// Its first cell.
     pub first: String,
+    /// Its first cell that is no number, with its line.
+    pub odd: Option<(u64, String)>,
+}
+
+impl Known {
+    /// How many words of its name qualify what it holds.
+    fn n_qualifiers(&self) -> usize {
+        let role = self.role;
+        role.map_or(0, |role| {
+            quantities::n_qualifiers(&quantity_words(&self.name), role)
+        })
+    }
 }
 
 /// A table that was looked at.
@@ -92,14 +108,18 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
         n_words(cells) >= 2
             && n_words(cells) > n_numbers(cells)
             && below.any(|(_, cells)| n_numbers(cells) >= 2)
-    })?;
+    });
+    let at = at.or_else(|| unread::head(lines))?;
     let (head_line, head) = &lines[at];
-    let rows: Vec<&Vec<String>> = lines[at + 1..]
+    let has_numbers = lines[at + 1..]
         .iter()
-        .map(|(_, cells)| cells)
-        .filter(|cells| n_numbers(cells) > 0)
-        .take(LOOKED_AT)
-        .collect();
+        .any(|(_, cells)| n_numbers(cells) > 0);
+    let is_row = |cells: &[String]| match has_numbers {
+        true => n_numbers(cells) > 0,
+        false => cells.iter().any(|cell| unread::has_digit(cell)),
+    };
+    let rows = lines[at + 1..].iter().filter(|(_, cells)| is_row(cells));
+    let rows: Vec<&(u64, Vec<String>)> = rows.take(LOOKED_AT).collect();
     let below = lines.get(at + 1).map_or(&[][..], |(_, cells)| cells);
     let units = below
         .iter()
@@ -108,11 +128,10 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
     let units = if stated::is_row(units) { below } else { &[] };
     let columns = head.iter().enumerate().filter(|(_, name)| !name.is_empty());
     let columns = columns.map(|(k, name)| {
-        let cells: Vec<&str> = rows
+        let cells: Vec<(u64, &str)> = rows
             .iter()
-            .filter_map(|row| row.get(k))
-            .map(String::as_str)
-            .filter(|cell| !cell.is_empty())
+            .filter_map(|(line, row)| Some((*line, row.get(k)?.as_str())))
+            .filter(|(_, cell)| !cell.is_empty())
             .collect();
         let unit = units
             .get(k)
@@ -146,11 +165,20 @@ fn is_instant(cell: &str) -> bool {
 pub fn of_text(text: &str) -> Result<Option<Recognised>> {
     let end = text.match_indices('\n').nth(BEGIN);
     let begin = end.map_or(text, |(end, _)| &text[..end]);
-    let forms = [(';', ','), ('\t', ','), (';', '.'), ('\t', '.'), (',', '.')];
+    let forms = [
+        (';', ','),
+        ('\t', ','),
+        (';', '.'),
+        ('\t', '.'),
+        (',', '.'),
+        (',', ','),
+    ];
     let mut failed = None;
     let mut looked = vec![];
     for (separator, decimal) in forms {
         match Sheet::of_text(begin, separator) {
+            // In quotes cells have commas too, before decimals or between thousands.
+            Ok(sheet) if separator == decimal && !unread::has_decimal_commas(&sheet) => {}
             Ok(sheet) => looked.extend(of(&sheet, decimal)),
             Err(error) => failed = Some(error),
         }
@@ -195,8 +223,11 @@ fn both(name: Stated, below: Stated) -> Stated {
     }
 }
 
-fn known(name: &str, below: Stated, cells: &[&str], decimal: char) -> Known {
-    let (words, unit_word) = parts(name);
+fn known(name: &str, below: Stated, lines: &[(u64, &str)], decimal: char) -> Known {
+    let cells: Vec<&str> = lines.iter().map(|(_, cell)| *cell).collect();
+    let cells = cells.as_slice();
+    let (_, unit_word) = parts(name);
+    let words = quantity_words(name);
     let stated = both(stated::of(name), below);
     let unit = stated.unit();
     let unit = unit.or_else(|| times::named_unit(name));
@@ -223,6 +254,7 @@ fn known(name: &str, below: Stated, cells: &[&str], decimal: char) -> Known {
         unknown,
         numbers,
         first: first(cells, decimal).to_owned(),
+        odd: odd(lines, decimal),
     }
 }
 
@@ -231,6 +263,14 @@ fn first<'c>(cells: &[&'c str], decimal: char) -> &'c str {
     let is_value = |cell: &&&str| number_of(cell, decimal).is_some() || is_instant(cell);
     let value = cells.iter().find(is_value).or(cells.first());
     value.copied().unwrap_or_default()
+}
+
+/// The first cell that is neither a number nor an instant nor missing, with its line.
+fn odd(lines: &[(u64, &str)], decimal: char) -> Option<(u64, String)> {
+    let is_value =
+        |cell: &str| number_of(cell, decimal).is_some() || is_instant(cell) || is_missing(cell);
+    let odd = lines.iter().find(|(_, cell)| !is_value(cell));
+    odd.map(|(line, cell)| (*line, (*cell).to_owned()))
 }
 
 /// Whether a column without a unit is that of a thermometer: named by a place, with numbers that are degrees Celsius.
@@ -246,7 +286,7 @@ fn is_warm(words: &[String], numbers: &[f64]) -> bool {
 }
 
 /// The words of a name in lower case, and what stands where a unit does: in brackets, or last behind a blank, `/` or `_`.
-fn parts(name: &str) -> (Vec<String>, Option<String>) {
+pub fn parts(name: &str) -> (Vec<String>, Option<String>) {
     let mut rest = name.to_owned();
     let mut unit = None;
     for (open, close) in [('[', ']'), ('(', ')')] {
@@ -274,6 +314,14 @@ fn parts(name: &str) -> (Vec<String>, Option<String>) {
     (words, unit)
 }
 
+/// The words of a name and of a note in its brackets, without the unit.
+fn quantity_words(name: &str) -> Vec<String> {
+    let (mut all, inner) = parts(name);
+    let note = inner.filter(|inner| Unit::of_word(inner).is_none());
+    all.extend(note.iter().flat_map(|note| words(note)));
+    all
+}
+
 /// Whether a column is that of the directions; one odd cell makes no other of it.
 fn is_direction(cells: &[&str], is_named: bool, is_numeric: bool) -> bool {
     let ways = cells.iter().filter_map(|cell| Direction::of_word(cell));
@@ -295,7 +343,6 @@ fn role(
             .iter()
             .any(|word| starts.iter().any(|start| word.starts_with(start)))
     };
-    let is_one = |whole: &[&str]| words.iter().any(|word| whole.contains(&word.as_str()));
     let names_way = has(&["dir", "way", "richt", "approach", "sense"]);
     if is_direction(cells, names_way, is_numeric) {
         return Some(Role::Direction);
@@ -308,72 +355,18 @@ fn role(
     if !is_numeric || is_correction(name) || is_reversed(name) {
         return None;
     }
-    if let Some(direction) = way_of(name, words) {
-        return Some(Role::Pass(direction));
+    if let Some(pass) = pass_names::of(name) {
+        return Some(Role::Pass(pass.direction));
     }
-    let roles: [(Role, bool); 9] = [
-        (Role::Temperature, has(&["temp", "therm"])),
-        (
-            Role::Time,
-            has(&["time", "zeit", "stamp", "epoch"]) || is_one(&["t", "date", "datum"]),
-        ),
-        (Role::Radial, has(&["radial", "radius", "ballbar"])),
-        (Role::Angle, has(&["angle", "winkel", "theta", "phi"])),
-        (
-            Role::Deviation,
-            has(&["dev", "err", "abweich", "fehler", "diff", "delta"]),
-        ),
-        (
-            Role::Measured,
-            has(&["measur", "actual", "reading", "mess"]) || is_one(&["ist", "istwert", "laser"]),
-        ),
-        (
-            Role::Target,
-            has(&["target", "soll", "nominal", "position", "command", "ziel"]) || is_one(&["pos"]),
-        ),
-        (
-            Role::Run,
-            has(&["run", "cycle", "lauf", "zyklus", "pass"]) || is_one(&["nr", "no", "n"]),
-        ),
-        (
-            Role::Displacement,
-            has(&["displ", "drift", "growth", "weg"])
-                || kind == Some(Kind::Length)
-                || is_one(&["x", "y", "z"]),
-        ),
-    ];
-    roles
-        .into_iter()
-        .find(|(_, is_it)| *is_it)
-        .map(|(role, _)| role)
+    // One of a side is no quantity of both.
+    let role = quantities::of(words, kind == Some(Kind::Length))?;
+    let is_of_both = matches!(role, Role::Temperature | Role::Time | Role::Run);
+    (is_of_both || !pass_names::has_direction(name)).then_some(role)
 }
 
 /// What a column of numbers holds by its name alone.
 pub fn role_of_name(name: &str) -> Option<Role> {
-    let (words, _) = parts(name);
-    role(name, &words, None, (&[], true))
-}
-
-/// The direction in the name of a pass: `1 up`, `Run 2 ↓`, `3-`.
-fn way_of(name: &str, words: &[String]) -> Option<Direction> {
-    for (sign, direction) in [('↑', Direction::Up), ('↓', Direction::Down)] {
-        if name.contains(sign) {
-            return Some(direction);
-        }
-    }
-    let of_words = words.iter().filter(|word| {
-        let is_number = word.parse::<f64>().is_ok();
-        !is_number && word.as_str() != "pos" && word.as_str() != "neg"
-    });
-    let mut told = of_words.filter_map(|word| Direction::of_word(word));
-    let by_sign = || {
-        let trimmed = name.trim();
-        let numbered = trimmed.trim_end_matches(['+', '-', '\u{2212}']);
-        let sign = trimmed.get(numbered.len()..).unwrap_or_default();
-        let is_number = numbered.chars().any(|letter| letter.is_ascii_digit());
-        Direction::of_word(sign).filter(|_| is_number && !sign.is_empty())
-    };
-    told.next().or_else(by_sign)
+    role(name, &quantity_words(name), None, (&[], true))
 }
 
 /// The axis of a word that is its letter.
@@ -382,9 +375,20 @@ fn letter(word: &str) -> Option<Axis> {
 }
 
 impl Recognised {
-    /// The first column of a role.
+    /// The column of a role whose name says least beside it; of several the first.
     pub fn first(&self, role: Role) -> Option<&Known> {
-        self.columns.iter().find(|column| column.role == Some(role))
+        self.all(role).min_by_key(|column| column.n_qualifiers())
+    }
+
+    /// The other columns of the same role whose names say as little beside it.
+    pub fn as_plain<'c>(&'c self, read: &'c Known) -> impl Iterator<Item = &'c Known> {
+        let columns = self
+            .columns
+            .iter()
+            .filter(|column| column.role == read.role);
+        columns.filter(|column| {
+            column.name != read.name && column.n_qualifiers() == read.n_qualifiers()
+        })
     }
 
     /// Every column of a role.
@@ -436,13 +440,6 @@ impl Recognised {
 
     /// The axis that is named by the file, the lines above the table, or a column.
     pub fn axis(&self, stem: &str) -> Option<Axis> {
-        let split = |text: &str| -> Vec<String> {
-            let words = text.split(|letter: char| !letter.is_alphanumeric());
-            words
-                .filter(|word| !word.is_empty())
-                .map(str::to_uppercase)
-                .collect()
-        };
         // Of a name of a file a capital alone: `c.csv` is no axis.
         let of_name = || {
             let mut words = stem.split(|letter: char| !letter.is_alphanumeric());
@@ -450,10 +447,12 @@ impl Recognised {
         };
         let of_column = || {
             let read = [Role::Displacement, Role::Deviation, Role::Target];
-            let columns = read.into_iter().flat_map(|role| self.all(role));
-            columns.map(|column| split(&column.name)).find_map(|words| {
-                let first = words.first()?;
-                letter(first)
+            let read = read.into_iter().filter_map(|role| self.first(role));
+            let passes = self.passes().into_iter().map(|(column, _)| column);
+            let mut columns = passes.chain(read);
+            columns.find_map(|column| {
+                let pass = pass_names::of(&column.name).and_then(|pass| pass.axis);
+                pass.or_else(|| pass_names::axis_of(words(&column.name).first()?))
             })
         };
         self.axis_stated().or_else(of_name).or_else(of_column)

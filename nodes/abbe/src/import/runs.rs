@@ -3,7 +3,8 @@
 //! Rows with one number of run that stand together are a run, in the order of the measurement. A number that comes
 //! again after another one shows that the table was sorted by something else. Of a positioning test with a column of
 //! the direction the rows of each number are then gathered, upwards by ascending target first and downwards behind; of
-//! every other test the order of the measurement is lost, and the table is refused. Targets that are meant to be one become
+//! every other test the order of the measurement is lost, and the table is refused. Rows that are listed by target are put in
+//! order by their directions ([`listed`]). Targets that are meant to be one become
 //! one ([`same`]), rows without a number of run are counted, and passes that are numbered as runs become cycles
 //! ([`passes`]).
 
@@ -14,6 +15,7 @@ use metrology::Axis;
 use metrology::number::number;
 
 use super::limits::Range;
+use super::listed;
 use super::map::{Test, Units, units};
 use super::passes;
 use super::same;
@@ -36,6 +38,8 @@ pub struct Runs {
     pub runs: Vec<Vec<Row>>,
     /// What a reader should know of them.
     pub remarks: Vec<String>,
+    /// Whether rows came in the order of the measurement.
+    pub is_order_known: bool,
 }
 
 /// Finds the runs of a test's table.
@@ -61,6 +65,7 @@ fn ordered(test: &Test, table: &Table) -> Result<Runs> {
     let Runs {
         mut runs,
         mut remarks,
+        mut is_order_known,
     } = numbered(test, table)?;
     let Test::Positioning {
         axis,
@@ -69,25 +74,40 @@ fn ordered(test: &Test, table: &Table) -> Result<Runs> {
         ..
     } = test
     else {
-        return Ok(Runs { runs, remarks });
+        return Ok(Runs {
+            runs,
+            remarks,
+            is_order_known,
+        });
     };
     let units = units(*axis);
+    let relisted = listed::relist(&mut runs);
+    is_order_known &= relisted.is_none();
+    remarks.extend(relisted);
     if let Some(turn) = units.turn {
         remarks.extend(unwrap(&mut runs, turn));
     }
     remarks.extend(same::merge(&mut runs, *same_target_um, units));
     let is_counted = run.is_none() && test.passes().is_empty();
     if is_counted || passes::are_rows(&runs) {
-        let (counted, remark) = passes::repetitions(runs.concat())?;
-        runs = counted;
-        remarks.push(remark);
+        let counted = passes::repetitions(runs.concat())?;
+        runs = counted.runs;
+        remarks.extend(counted.remarks);
+        is_order_known &= counted.is_order_known;
     }
     remarks.extend(passes::without_readings(&mut runs));
     remarks.extend(passes::pair(&mut runs));
     check_directions(&runs, units)?;
+    let doubt = listed::doubt(&runs);
+    is_order_known &= doubt.is_none();
+    remarks.extend(doubt);
     remarks.extend(passes::broken_off(&runs));
     remarks.extend(check_targets(&runs, units)?);
-    Ok(Runs { runs, remarks })
+    Ok(Runs {
+        runs,
+        remarks,
+        is_order_known,
+    })
 }
 
 /// The runs by their numbers.
@@ -99,6 +119,7 @@ fn numbered(test: &Test, table: &Table) -> Result<Runs> {
             return Ok(Runs {
                 runs: vec![table.rows.clone()],
                 remarks: vec![],
+                is_order_known: true,
             });
         }
     };
@@ -131,7 +152,11 @@ fn numbered(test: &Test, table: &Table) -> Result<Runs> {
             );
         }
     };
-    Ok(Runs { runs, remarks })
+    Ok(Runs {
+        is_order_known: remarks.is_empty(),
+        runs,
+        remarks,
+    })
 }
 
 /// The first row whose number of run was there before another number, with that number.
@@ -497,11 +522,19 @@ mod tests {
         };
         assert!(rows(&[(0.0, UP), (9.0, UP), (9.0, DOWN), (0.0, DOWN)]).is_ok());
         assert!(rows(&[(0.0, DOWN), (0.0, UP), (9.0, UP), (9.0, DOWN)]).is_ok());
-        let sorted = rows(&[(0.0, DOWN), (0.0, UP), (9.0, DOWN), (9.0, UP)]);
+        let odd = rows(&[
+            (0.0, UP),
+            (9.0, DOWN),
+            (20.0, UP),
+            (20.0, DOWN),
+            (0.0, DOWN),
+        ]);
         assert_eq!(
-            sorted.unwrap_err().to_string(),
-            "line 4: run 1: target 9 mm after 0 mm is approached up, and its direction says down: rows must be in the order of the measurement"
+            odd.unwrap_err().to_string(),
+            "line 3: run 1: target 9 mm after 0 mm is approached up, and its direction says down: rows must be in the order of the measurement"
         );
+        let listed = rows(&[(0.0, DOWN), (0.0, UP), (9.0, DOWN), (9.0, UP)]).unwrap();
+        assert!(!listed.is_order_known, "{:?}", listed.remarks);
     }
 
     #[test]

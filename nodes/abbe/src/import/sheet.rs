@@ -21,6 +21,23 @@ pub struct Sheet {
     pub dates: Option<usize>,
 }
 
+/// The cells of a file, and which of its worksheets they are.
+#[derive(Debug, Default)]
+pub struct Cells {
+    /// The cells.
+    pub sheet: Sheet,
+    /// Name of the worksheet, where the file has several that hold anything.
+    pub name: Option<String>,
+    /// Which worksheet was read and which were not; nothing of a file with one.
+    pub note: Option<String>,
+    /// The instrument's own form that it is of, where it is of one.
+    pub form: Option<&'static str>,
+    /// What an instrument's file says beside its readings.
+    pub remarks: Vec<String>,
+    /// When its measurement began, s since 1970, where it says so.
+    pub start_s: Option<f64>,
+}
+
 impl Sheet {
     /// The cells of a text; lines that begin with `#` are comments.
     ///

@@ -6,6 +6,7 @@ use metrology::yaml::shown;
 
 use super::again;
 use super::beside;
+use super::clock_parts;
 use super::limits::Range;
 use super::map::{Column, Direction, Map, Test, What, units};
 use super::measured;
@@ -61,6 +62,7 @@ impl Table {
             first_missing: None,
             odd: Odd::default(),
             is_clock: false,
+            is_whole_clock: false,
         };
         let mut rows = vec![];
         let (mut n_empty, mut n_rows) = (0_u64, 0);
@@ -108,8 +110,9 @@ struct Reader<'t> {
     /// Line and column of the first.
     first_missing: Option<(u64, String)>,
     odd: Odd,
-    /// Whether a time was no plain number.
+    /// Whether a time was no plain number, and whether it had a date or three parts.
     is_clock: bool,
+    is_whole_clock: bool,
 }
 
 impl Reader<'_> {
@@ -158,6 +161,7 @@ impl Reader<'_> {
                 Read::Number(number) => numbers.push(number),
                 Read::Clock(time_s) => {
                     self.is_clock = true;
+                    self.is_whole_clock |= !clock_parts::has_two_parts(cell);
                     numbers.push(time_s);
                 }
                 Read::Odd(why) => {
@@ -173,14 +177,17 @@ impl Reader<'_> {
         Ok(Some(numbers))
     }
 
-    /// What is doubtful about the times of a log that are plain numbers.
+    /// What is doubtful about the times of a log.
     fn doubt(&self, rows: &[Row]) -> Result<Option<String>> {
-        let mut columns = self.columns.iter().filter(|_| !self.is_clock);
+        let mut columns = self.columns.iter().filter(|_| !self.is_whole_clock);
         let Some(place) = columns.position(|column| column.what == What::Time) else {
             return Ok(None);
         };
         let name = self.columns[place].name;
         let times_s: Vec<f64> = rows.iter().map(|row| row.cells[place]).collect();
+        if self.is_clock {
+            return clock_parts::of_two_parts(name, &times_s);
+        }
         times::of_column(name, &times_s, self.map.units.contains_key(name))
     }
 

@@ -105,7 +105,10 @@ fn in_24_hours(clock: &str) -> Option<String> {
     };
     let minutes = rest.get(..2)?;
     let behind = rest.get(2..)?;
-    // 08:15 and 08:15+01:00 have no seconds.
+    // 08:15 and 08:15+01:00 have no seconds; 0:30.5 has no hours.
+    if behind.starts_with(['.', ',']) {
+        return None;
+    }
     let seconds = if behind.starts_with(':') { "" } else { ":00" };
     Some(format!("{hour:02}:{minutes}{seconds}{behind}"))
 }
@@ -187,7 +190,7 @@ fn spacing(times: &[f64]) -> Option<(f64, f64)> {
 }
 
 /// Units in which numbers make a log as most are, the second first; none of times from 1970 on.
-fn usual(times: &[f64]) -> Vec<Unit> {
+pub fn usual(times: &[f64]) -> Vec<Unit> {
     let Some((step, length)) = spacing(times).filter(|_| times[0].abs() < EPOCH_S) else {
         return vec![];
     };

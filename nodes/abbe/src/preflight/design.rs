@@ -33,8 +33,7 @@ use folder::{Contents, INSTRUCTIONS, Setting};
 use instruments::Shop;
 use menu::Offer;
 
-use super::dry_run;
-use super::programme;
+use super::{dry_run, foreseen_now, programme};
 use crate::tell::tell;
 use crate::usage::refused;
 use crate::validate;
@@ -198,8 +197,14 @@ impl Wanted<'_> {
             "Written: {} (begin with {INSTRUCTIONS}).",
             self.out.display()
         ));
-        let title = format!("Designed programme: {}", self.out.display());
-        let page = designed::page(&title, &designed.design, order_of(&stands), &notes)?;
+        let title = format!(
+            "Designed programme for {}: {} min",
+            machine.name,
+            number(self.minutes)
+        );
+        let mut page = designed::page(&title, &designed.design, order_of(&stands), &notes)?;
+        let folder = self.out.display().to_string();
+        page.screen.made = Some(foreseen_now(&machine.name, &folder));
         if let Some(path) = self.html {
             whole_file::write(path, &page.html())?;
         }

@@ -8,11 +8,13 @@ use reports::evaluate::limits::CONFORMS;
 use reports::loss;
 use reports::page::figure;
 use reports::screen::{Screen, Tile, Tone};
-use reports::section::{Section, capitalised};
+use reports::section::{Section, capitalised, um};
 use reports::terminal::Rank;
 
 /// What a verdict without limits says.
 const NOT_JUDGED: &str = "Not judged: no limits were given.";
+/// Most tiles of figures that do not conform.
+const MOST_FAILED_ON_TILES: usize = 2;
 /// Most tiles of answers.
 const MOST_ANSWERS_ON_TILES: usize = 4;
 
@@ -37,17 +39,47 @@ pub(super) fn of(
         // The space diagonals together have the figures of each.
         shown.retain(|one| !one.title.starts_with("Diagonal "));
     }
-    let tiles = { shown.iter() }
-        .take(MOST_ANSWERS_ON_TILES)
-        .map(|one| tile(one));
-    let tiles = tiles.collect();
+    let tiles: Vec<Tile> = match shown.as_slice() {
+        [only] if only.tile.is_none() => tiles_of(only),
+        several => {
+            let tiles = several.iter().take(MOST_ANSWERS_ON_TILES);
+            tiles.map(|one| tile(one)).collect()
+        }
+    };
+    let mut all = judged.map(judged_tiles).unwrap_or_default();
+    all.extend(tiles);
+    all.extend(shown.first().and_then(|first| range(first, sections)));
     Screen {
         verdict: verdict(tests, (&shown, sections), judged),
-        tiles,
+        tiles: all,
         lacks: lacks(tests, sections, stated),
         picture: picture(&shown, sections),
         ..Screen::default()
     }
+}
+
+/// The figures that do not conform or cannot be decided, each beside its limits; else how many conform.
+fn judged_tiles(judged: &Section) -> Vec<Tile> {
+    let rows = judged.tables.first().map_or(&[][..], |table| &table.rows);
+    let mut failed: Vec<Tile> = Vec::new();
+    for row in rows {
+        if let [figure, test, value, limits, decision, ..] = row.as_slice()
+            && !decision.starts_with(CONFORMS)
+        {
+            let test = test.split(": ").next().unwrap_or(test);
+            let more = format!("{decision}: must be {limits}; {test}");
+            failed.push(Tile::new(figure, value, more).toned(Tone::Bad));
+        }
+    }
+    if failed.is_empty() && !rows.is_empty() {
+        let n = rows.len();
+        let all = Tile::new("figures within their limits", format!("{n} of {n}"), "");
+        return vec![all.toned(Tone::Good)];
+    }
+    // `does not conform` comes before `cannot be decided`.
+    failed.sort_by(|a, b| b.more.cmp(&a.more));
+    failed.truncate(MOST_FAILED_ON_TILES);
+    failed
 }
 
 /// The parts without the circles and drifts that another of their plane or axis exceeds, each worst circle followed by the
@@ -72,6 +104,18 @@ fn rivals<'s>(
     all: impl Iterator<Item = &'s Section>,
 ) -> impl Iterator<Item = &'s Section> {
     all.filter(|other| kind_of(other) == kind_of(one) && size_mm(other).is_some())
+}
+
+/// The least and the greatest of the circles or drifts of one kind, where there are several.
+fn range(first: &Section, sections: &[Section]) -> Option<Tile> {
+    size_mm(first)?;
+    let sizes_mm: Vec<f64> = rivals(first, sections.iter()).filter_map(size_mm).collect();
+    let n = sizes_mm.len();
+    let least_mm = sizes_mm.iter().copied().fold(f64::INFINITY, f64::min);
+    let greatest_mm = sizes_mm.iter().copied().fold(0.0, f64::max);
+    let value = format!("{} to {} µm", um(least_mm), um(greatest_mm));
+    let more = "least and greatest of its kind; run by run below";
+    (n > 1).then(|| Tile::new(&format!("all {n}"), value, more))
 }
 
 fn is_of_circles(section: &Section) -> bool {
@@ -116,6 +160,10 @@ fn picture(shown: &[&Section], sections: &[Section]) -> Option<Markup> {
         let caption = format!("{}. {}", one.title, drawing.caption);
         figure(&drawing.svg, &caption)
     });
+    // The temperatures of a logged drift are drawn behind it.
+    let meanwhile = section.drawings.get(1);
+    let meanwhile = meanwhile.filter(|_| !section.figures["iso230_3_log"].is_null());
+    let beside = beside.or_else(|| Some(figure(&meanwhile?.svg, &meanwhile?.caption)));
     Some(match beside {
         Some(beside) => html! { div.pair { (first) (beside) } },
         None => first,
@@ -142,6 +190,47 @@ fn tile(section: &Section) -> Tile {
             None => Tile::new(title, value, more),
         },
     }
+}
+
+/// A tile for each figure of the answer of a part that stands alone on the page.
+fn tiles_of(section: &Section) -> Vec<Tile> {
+    let answer = section.answers.first().map_or("", String::as_str);
+    let (reservation, answer) = apart(answer.trim_end_matches('.'));
+    // What holds for all figures stands in brackets behind them.
+    let in_brackets = answer.strip_suffix(')');
+    let in_brackets = in_brackets.and_then(|answer| answer.rsplit_once(" ("));
+    let (figures, for_all) = in_brackets.unwrap_or((answer, ""));
+    let about = [short_title(section).as_str(), for_all, reservation]
+        .into_iter()
+        .filter(|text| !text.is_empty())
+        .collect::<Vec<_>>()
+        .join("; ");
+    let parts = figures.split([',', ';']).map(str::trim);
+    let parts = parts.map(|part| part.strip_prefix("and ").unwrap_or(part));
+    let figures: Option<Vec<(String, String)>> = parts
+        .map(|part| figure_of(part).or_else(|| figure_first(part)))
+        .collect();
+    let Some(figures) = figures.filter(|figures| figures.len() > 1) else {
+        return vec![tile(section)];
+    };
+    let tiles = figures
+        .into_iter()
+        .enumerate()
+        .map(|(place, (name, figure))| {
+            let more = if place == 0 { about.as_str() } else { for_all };
+            Tile::new(&name, figure, more)
+        });
+    tiles.take(MOST_ANSWERS_ON_TILES).collect()
+}
+
+/// `-14.69 µm after an hour` as its words and its number; `None` where no number with a unit comes first.
+fn figure_first(part: &str) -> Option<(String, String)> {
+    let words: Vec<&str> = part.split(' ').collect();
+    let [number, unit, rest @ ..] = words.as_slice() else {
+        return None;
+    };
+    let is_figure = number.parse::<f64>().is_ok() && TILE_UNITS.contains(unit);
+    (is_figure && !rest.is_empty()).then(|| (rest.join(" "), format!("{number} {unit}")))
 }
 
 /// A title without place, cause and instrument.
@@ -207,6 +296,9 @@ fn verdict(
     if let Some(broken) = tests.broken_off.first() {
         return Some((broken.to_string(), Tone::Bad));
     }
+    if let Some(run) = tests.not_evaluated.first() {
+        return Some((run.to_string(), Tone::Bad));
+    }
     if let Some(judged) = judged {
         let answer = judged.answers.first()?.clone();
         let rows = judged.tables.first().map_or(&[][..], |table| &table.rows);
@@ -262,12 +354,13 @@ fn uncapitalised(sentence: &str) -> String {
 
 fn lacks(tests: &Tests, sections: &[Section], stated: bool) -> Vec<String> {
     let mut lacks: Vec<String> = tests.broken_off.iter().map(as_text).collect();
+    lacks.extend(tests.not_evaluated.iter().map(ToString::to_string));
     lacks.extend(warnings(sections));
     if sections.is_empty() {
         lacks.push("The bag holds no test that can be evaluated.".to_owned());
     } else if !stated {
         lacks.push(
-            "No budget (--budget): expanded uncertainties of ISO 230-2, -4 and -6 are not stated."
+            "No budget (--budget): expanded uncertainties of ISO 230-2, 230-4 and 230-6 are not stated."
                 .to_owned(),
         );
     }
@@ -300,193 +393,4 @@ fn as_text(one: &impl Display) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn section(title: &str, answer: &str, rank: Rank) -> Section {
-        let mut section = Section::new(title).ranked(rank);
-        if !answer.is_empty() {
-            section.answer(answer.to_owned());
-        }
-        section
-    }
-
-    #[test]
-    fn the_most_important_answer_is_the_verdict_and_each_has_a_tile() {
-        let mut silent = section("Circle XY", "", Rank::Table);
-        silent.not_evaluated("one sense only");
-        let all = [
-            section(
-                "Positioning X, run 1 on: laser",
-                "accuracy A 8.50 ± 0.40 µm, systematic deviation E 5.00 µm.",
-                Rank::Table,
-            ),
-            silent,
-            section(
-                "Space diagonals",
-                "Systematic deviation E_d 12.00 µm.",
-                Rank::Answer,
-            ),
-        ];
-        let screen = of(&Tests::default(), &all, None, true);
-        let (verdict, tone) = screen.verdict.clone().unwrap();
-        assert_eq!(
-            verdict,
-            "Space diagonals: systematic deviation E_d 12.00 µm. Not judged: no limits were given."
-        );
-        assert_eq!(tone, Tone::Plain);
-        assert_eq!(screen.tiles[1].name, "Positioning X, run 1 on");
-        assert_eq!(screen.tiles[1].value, "8.50 ± 0.40 µm");
-        assert!(screen.tiles[1].more.starts_with("accuracy A; systematic"));
-        assert_eq!(screen.lacks, ["Circle XY: Not evaluated: one sense only."]);
-    }
-
-    fn circle(title: &str, error_mm: f64) -> Section {
-        let answer = format!("circular error G of both senses {:.2} µm.", error_mm * 1e3);
-        let mut circle = section(title, &answer, Rank::Table);
-        circle.figures =
-            serde_json::json!({"iso230_4": {"both": {"circular_error": {"value_mm": error_mm}}}});
-        circle
-    }
-
-    #[test]
-    fn the_worst_circle_of_a_plane_and_its_largest_cause_come_first() {
-        let mut causes = section(
-            "Causes in XY, not compensated",
-            "Largest cause: play.",
-            Rank::Table,
-        );
-        causes.figures = serde_json::json!({"breakdown": {}});
-        causes.tile = Some(Tile::new(
-            "largest cause in XY",
-            "backlash X 5.0 ± 0.2 µm",
-            "",
-        ));
-        let all = [
-            circle(
-                "Circle XY, R 50.000 mm, 1500 mm/min about (0.0, 0.0, 30.0), runs 5 and 6: not compensated",
-                0.0108,
-            ),
-            circle(
-                "Circle XY, R 50.000 mm, 6000 mm/min about (0.0, 0.0, 30.0), runs 9 and 10: not compensated",
-                0.0132,
-            ),
-            section(
-                "Geometric errors",
-                "4 of 51 coefficients are known.",
-                Rank::Table,
-            ),
-            causes,
-        ];
-        let screen = of(&Tests::default(), &all, None, true);
-        assert_eq!(
-            screen.verdict.unwrap().0,
-            "Circle XY, R 50.000 mm, 6000 mm/min, runs 9 and 10: circular error G of both senses 13.20 µm; the greatest of 2; largest cause in XY: backlash X 5.0 ± 0.2 µm. Not judged: no limits were given."
-        );
-        let names: Vec<&str> = screen.tiles.iter().map(|tile| tile.name.as_str()).collect();
-        assert_eq!(
-            names,
-            [
-                "Circle XY, R 50.000 mm, 6000 mm/min, runs 9 and 10",
-                "largest cause in XY",
-                "Geometric errors"
-            ]
-        );
-    }
-
-    #[test]
-    fn a_number_is_taken_out_of_its_words_where_they_stay_readable() {
-        for (value, name, figure) in [
-            ("accuracy A 8.50 ± 0.40 µm", "accuracy A", "8.50 ± 0.40 µm"),
-            (
-                "G of both senses 10.84 ± 0.60 µm (k = 2)",
-                "G of both senses (k = 2)",
-                "10.84 ± 0.60 µm",
-            ),
-            ("reversal -3.0 µm", "reversal", "-3.0 µm"),
-            ("accuracy A — µm", "", ""),
-            ("6 recordings", "", ""),
-            ("X: scale and motor are up to 39.71 µm apart", "", ""),
-            ("", "", ""),
-        ] {
-            let wanted = (!name.is_empty()).then(|| (name.to_owned(), figure.to_owned()));
-            assert_eq!(figure_of(value), wanted, "{value:?}");
-        }
-    }
-
-    #[test]
-    fn a_tile_shows_a_number_and_no_sentence() {
-        let shown = |title: &str, answer: &str| {
-            let one = tile(&section(title, answer, Rank::Table));
-            (one.value, one.more)
-        };
-        let positioning = shown(
-            "Positioning X, run 1 on: not compensated, by the length reference",
-            "as measured, not at 20 °C: accuracy A 127.39 µm, systematic deviation E 121.89 µm.",
-        );
-        assert_eq!(positioning.0, "127.39 µm");
-        assert_eq!(
-            positioning.1,
-            "accuracy A; systematic deviation E 121.89 µm; as measured, not at 20 °C"
-        );
-        let widest = "Widest corner of run 18: 39.41 µm between the greatest deviations.";
-        assert_eq!(shown("Lines", widest).0, "39.41 µm");
-        let tables = "X: scale and motor are up to 39.71 µm apart; up minus down -4.24 µm.";
-        let (value, more) = shown("Positioning tables", tables);
-        assert_eq!(value, "39.71 µm");
-        assert!(more.starts_with("X: scale and motor"), "{more}");
-        assert_eq!(
-            shown("t", "4 of 51 coefficients are known.").0,
-            "4 of 51 coefficients are known"
-        );
-    }
-
-    #[test]
-    fn a_verdict_has_one_colon_before_its_figures() {
-        let one = section(
-            "Positioning X, run 1 on: not compensated, by the length reference",
-            "as measured, not at 20 °C: accuracy A 127.39 µm.",
-            Rank::Table,
-        );
-        assert_eq!(
-            of(&Tests::default(), &[one], None, true).verdict.unwrap().0,
-            "Positioning X, run 1 on, by the length reference: accuracy A 127.39 µm (as measured, not at 20 °C). Not judged: no limits were given."
-        );
-    }
-
-    #[test]
-    fn the_greatest_of_several_drifts_is_the_verdict_and_like_warnings_are_one() {
-        let drift = |run: u32, range_mm: f64| {
-            let title = format!("Thermal drift of Z, run {run}, ISO 230-3: cause not stated");
-            let mut one = section(
-                &title,
-                &format!("range {:.2} µm.", range_mm * 1e3),
-                Rank::Table,
-            );
-            one.figures =
-                serde_json::json!({"iso230_3_log": {"figures": {"range": {"value_mm": range_mm}}}});
-            one.warn("Recorded too briefly", "Recorded for 1.00 h.".to_owned());
-            one
-        };
-        let all = [drift(1, 0.0237), drift(2, 0.0242), drift(3, 0.0232)];
-        let screen = of(&Tests::default(), &all, None, true);
-        assert_eq!(
-            screen.verdict.unwrap().0,
-            "Thermal drift of Z, run 2, ISO 230-3, cause not stated: range 24.20 µm; the greatest of 3. Not judged: no limits were given."
-        );
-        assert_eq!(screen.tiles.len(), 1);
-        assert_eq!(
-            screen.lacks,
-            ["Thermal drift of Z, run 1, ISO 230-3 and 2 more: Recorded for 1.00 h."]
-        );
-    }
-
-    #[test]
-    fn without_a_test_and_without_a_budget_that_is_said() {
-        let none = of(&Tests::default(), &[], None, true);
-        assert!(none.verdict.is_none() && none.lacks.len() == 1);
-        let all = [section("Circle XY", "G 3.00 µm.", Rank::Table)];
-        let lacks = of(&Tests::default(), &all, None, false).lacks;
-        assert!(lacks[0].contains("--budget"), "{lacks:?}");
-    }
-}
+mod tests;

@@ -38,10 +38,11 @@ impl FromTable {
     }
 }
 
-/// Whether a path is a table by its name.
+/// Whether a path is a table by its name, or a file of an instrument by its content.
 pub fn is_table(path: &Path) -> bool {
     let end = path.extension().and_then(|end| end.to_str());
-    end.is_some_and(|end| ENDS.contains(&end.to_lowercase().as_str())) && !path.is_dir()
+    let is_named = end.is_some_and(|end| ENDS.contains(&end.to_lowercase().as_str()));
+    !path.is_dir() && (is_named || import::is_of_instrument(path))
 }
 
 /// Imports a table by a map, or by what is recognised in it; `None` for a bag.
@@ -52,15 +53,37 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
     if !is_table(path) {
         if map.is_some() {
             bail!(
-                "--map does nothing: {} is no table, which ends with one of {}",
+                "--map does nothing: {} is no table, which ends with one of {}, and no file of an instrument",
                 path.display(),
                 ENDS.join(", ")
             );
         }
         return Ok(None);
     }
-    let (named, mut lines) = match map {
-        Some(map) => (Named::read(map, "map")?, vec![]),
+    let (described, read) = described(path, map)?;
+    let machine = Named {
+        place: "the machine that is taken where none is stated".to_owned(),
+        text: propose::machine_for(&read),
+    };
+    imported(path, described, machine).map(Some)
+}
+
+/// The same for a machine file.
+///
+/// # Errors
+/// As [`of`], and where the machine could not have been measured so.
+pub fn of_machine(path: &Path, map: Option<&Path>, machine: Named) -> Result<FromTable> {
+    let (described, _) = described(path, map)?;
+    imported(path, described, machine)
+}
+
+/// A map, its keys whose values are assumed, and the lines of what it rests on.
+type Described = (Named, Vec<String>, Vec<String>);
+
+/// The map that is given, or the one that is proposed.
+fn described(path: &Path, map: Option<&Path>) -> Result<(Described, Map)> {
+    let (named, assumed, lines) = match map {
+        Some(map) => (Named::read(map, "map")?, vec![], vec![]),
         None => proposed(path)?,
     };
     let place = &named.place;
@@ -70,25 +93,29 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
             yaml::placed(place, &named.text, &error.to_string())
         )
     })?;
-    let machine = Named {
-        place: "the machine that is taken where none is stated".to_owned(),
-        text: propose::machine_for(&read),
-    };
+    Ok(((named, assumed, lines), read))
+}
+
+fn imported(
+    path: &Path,
+    (named, assumed, mut lines): Described,
+    machine: Named,
+) -> Result<FromTable> {
     let home = Vanishing::temporary().context("a folder for the bag of the table")?;
     let bag = home.path().join("bag");
-    let imported = import::import(path, &named, machine, &bag)?;
+    let imported = import::import(path, (&named, &assumed), machine, &bag)?;
     lines.extend(imported.notes);
     lines.sort_by_key(|line| !line.starts_with(WARNING));
-    Ok(Some(FromTable {
+    Ok(FromTable {
         _home: home,
         bag,
         lines,
         n_odd: imported.n_odd,
-    }))
+    })
 }
 
-/// The map that is proposed for a table, with what it rests on.
-fn proposed(path: &Path) -> Result<(Named, Vec<String>)> {
+/// The map that is proposed for a table, its keys whose values are assumed, and what it rests on.
+fn proposed(path: &Path) -> Result<(Named, Vec<String>, Vec<String>)> {
     let proposal = propose::of(path).with_context(|| format!("table {}", path.display()))?;
     let mut lines: Vec<String> = proposal.recognised;
     // What was assumed of a column is not folded with what the table lacks.
@@ -101,5 +128,5 @@ fn proposed(path: &Path) -> Result<(Named, Vec<String>)> {
         place: "proposed for the table (abbe import --propose prints it)".to_owned(),
         text: proposal.map,
     };
-    Ok((named, lines))
+    Ok((named, proposal.assumed, lines))
 }

@@ -5,6 +5,7 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::import::Import;
+mod conditions;
 mod odd;
 
 const REFERENCE: &str = include_str!("../../../../tests/validation/iso230_tables.json");
@@ -411,26 +412,6 @@ fn val_a_worksheet_as_reports_print_it_has_the_same_figures() {
     }
 }
 
-#[test]
-fn the_resolution_that_a_map_states_is_in_the_bag() {
-    let home = TempDir::new().unwrap();
-    let map = text_file::yaml(&root("tests/import/positioning.yaml")).unwrap();
-    let map = format!("resolution_um: 10.0\n{map}");
-    reported_by(
-        &home,
-        &root("tests/import/positioning.csv"),
-        &map,
-        "gap_first",
-        None,
-    );
-    let bag = Bag::open(home.path().join("bag")).unwrap();
-    let stated = bag.attachment("params/import.yaml").unwrap().unwrap();
-    assert_eq!(
-        String::from_utf8(stated.data).unwrap(),
-        "resolution_um: 10.0\n"
-    );
-}
-
 /// The page of a table alone: no map, no machine file.
 fn reported_alone(table: &Path) -> (Report, Vec<String>) {
     let taken = from_table::of(table, None).unwrap().unwrap();
@@ -524,11 +505,8 @@ fn units_that_cannot_be_right_are_asked_about() {
 
 #[test]
 fn a_map_for_a_bag_is_refused_and_a_folder_is_a_bag() {
-    assert!(
-        from_table::of(Path::new("runs/a.bag"), None)
-            .unwrap()
-            .is_none()
-    );
+    let folder = from_table::of(Path::new("runs/a.bag"), None).unwrap();
+    assert!(folder.is_none());
     let Err(refused) = from_table::of(Path::new("bag"), Some(Path::new("map.yaml"))) else {
         panic!("taken");
     };
@@ -546,6 +524,8 @@ fn a_rotary_axis_without_a_reference_says_why_it_has_no_figures() {
         targets_rad: vec![],
         up_rad: vec![],
         down_rad: vec![],
+        mean_rad: 0.0,
+        outlying: Default::default(),
         left_out: vec![],
         longest_rest: Some(metrology::stamp::Span::from_nanos(2_000_000_000)),
         has_readings: false,

@@ -34,9 +34,6 @@ pub fn begin(
 ) -> Result<Recorder> {
     let simulated = composed.is_some();
     let config = RecorderConfig {
-        compression: scenario.file.recording.compression,
-        max_file_bytes: scenario.file.recording.max_file_bytes,
-        max_file_s: scenario.file.recording.max_file_s,
         flush_period_s: if simulated {
             SIMULATED_FLUSH_S
         } else {
@@ -47,7 +44,7 @@ pub fn begin(
         } else {
             WhenFull::CountLoss
         },
-        ..RecorderConfig::default()
+        ..scenario.file.recording.config()
     };
     let name = path
         .file_name()

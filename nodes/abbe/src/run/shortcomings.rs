@@ -19,7 +19,7 @@ struct Told<'e> {
     message: &'e str,
 }
 
-/// Everything that did not go as told, a line each; empty: nothing.
+/// Everything that did not go as planned, a line each; empty: nothing.
 pub fn of(evidence: &Evidence, lost_messages: u64) -> Vec<String> {
     let mut lines: Vec<String> = steps_not_run(evidence).into_iter().collect();
     lines.extend(touches_not_used(evidence));

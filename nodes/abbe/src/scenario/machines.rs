@@ -3,7 +3,7 @@
 //! Files are compared by their meaning: layout, comments and values that are the defaults make no difference. Nodes of
 //! different namespaces may be those of different machines.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
@@ -18,6 +18,8 @@ use crate::launch::LaunchNode;
 
 /// What goes into the bag of a run.
 const MACHINE_FILE: &str = "machine.yaml";
+/// Nodes of which a cell may have several.
+const PLURAL: [&str; 3] = ["host_clock", "recorder", "replayer"];
 /// Longest value that a message shows, characters.
 const SHOWN: usize = 60;
 
@@ -30,7 +32,7 @@ struct Reader {
     own: &'static [&'static str],
 }
 
-/// Refuses nodes of one namespace whose machine files differ, and a `machine.yaml` of the folder, which the run's bag
+/// Refuses two nodes of one kind in a namespace, nodes of one namespace whose machine files differ, and a `machine.yaml` of the folder, which the run's bag
 /// gets, that differs from theirs. Who cannot be read is left to who builds the nodes.
 ///
 /// # Errors
@@ -38,12 +40,29 @@ struct Reader {
 pub fn check(folder: &Path, nodes: &[LaunchNode]) -> Result<()> {
     let spaces: BTreeSet<&str> = nodes.iter().map(namespace).collect();
     for space in &spaces {
+        check_single(nodes.iter().filter(|node| namespace(node) == *space))?;
         let of_space = nodes.iter().filter(|node| namespace(node) == *space);
         let mut readers: Vec<Reader> = of_space.filter_map(reader).collect();
         if spaces.len() == 1 && !readers.is_empty() {
             readers.extend(of_bag(folder));
         }
         compare(&readers)?;
+    }
+    Ok(())
+}
+
+/// Refuses two nodes of one kind in a namespace: both would publish the same, and each measurement would stand twice.
+fn check_single<'n>(nodes: impl Iterator<Item = &'n LaunchNode>) -> Result<()> {
+    let mut first = BTreeMap::<&str, &str>::new();
+    for node in nodes.filter(|node| !PLURAL.contains(&node.exec.as_str())) {
+        if let Some(other) = first.insert(&node.exec, &node.name) {
+            bail!(
+                "nodes {other} and {} are both a {} of one namespace, and would publish the same topics: take one out, or give it a \
+                 namespace of its own",
+                node.name,
+                node.exec
+            );
+        }
     }
     Ok(())
 }
@@ -201,6 +220,35 @@ mod tests {
                 Err(error) => format!("{error:#}"),
             }
         }
+    }
+
+    #[test]
+    fn a_namespace_has_one_node_of_a_kind_but_recorders() {
+        let folder = tempfile::tempdir().unwrap();
+        let node = |exec: &str, name: &str, namespace: &str| LaunchNode {
+            exec: exec.to_owned(),
+            name: name.to_owned(),
+            namespace: namespace.to_owned(),
+            parameter_files: vec![],
+            parameters: vec![],
+            ends_within: None,
+        };
+        let two = |exec, spaces: [&str; 2]| {
+            let nodes = [node(exec, "a", spaces[0]), node(exec, "b", spaces[1])];
+            check(folder.path(), &nodes)
+        };
+        for exec in [
+            "fake_cnc",
+            "axis_compensation",
+            "sequencer",
+            "probe",
+            "thermal_model",
+        ] {
+            let error = two(exec, ["", "/"]).unwrap_err().to_string();
+            assert!(error.contains("nodes a and b are both a "), "{error}");
+            assert!(two(exec, ["left", "right"]).is_ok(), "{exec}");
+        }
+        assert!(two("recorder", ["", ""]).is_ok());
     }
 
     #[test]

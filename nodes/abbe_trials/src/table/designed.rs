@@ -129,7 +129,7 @@ pub fn ten_lines(table: &Table, ratio: Option<Ratio>) -> Vec<String> {
     let of = |arm: Arm| table.programmes.iter().find(|overview| overview.arm == arm);
     let [known, left_out, rounds] =
         [Arm::Designed, Arm::DesignedLeftOut, Arm::DesignedTwoRounds].map(of);
-    let mut lines = Vec::from(of_names(known, &table.targets));
+    let mut lines = of_names(known, &table.targets).to_vec();
     lines.extend(of_sizes(known));
     lines.extend(of_what_is_open(left_out, rounds));
     lines.push(format!(

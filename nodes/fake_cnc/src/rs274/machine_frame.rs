@@ -11,7 +11,7 @@ use metrology::PerAxis;
 use super::block::{Block, Mode, Said, ToolLength};
 use super::modal::Reader;
 use super::program::FirstMotion;
-use super::registers::{Change, Modes, SYSTEMS, is_zero, list, list_system};
+use super::registers::{Change, Modes, SYSTEMS, is_zero, list, list_system, list_zeros};
 use super::words::Word;
 use crate::error::{Place, ProgramError};
 
@@ -22,7 +22,8 @@ impl Reader<'_> {
         let axes = self.envelope.axes;
         if !is_zero(&found.shift) {
             let offset = list(&found.shift, axes);
-            return Err(ProgramError::ShiftInEffect { at, offset });
+            let zeros = list_zeros(&found.shift, axes);
+            return Err(ProgramError::ShiftInEffect { at, offset, zeros });
         }
         let Some(system) = found.first_zero_system() else {
             let listed = |(index, system)| list_system(index, system, axes);

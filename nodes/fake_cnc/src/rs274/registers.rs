@@ -240,6 +240,12 @@ pub(super) fn is_zero(of: &PerAxis<f64>) -> bool {
     of.0.iter().all(|value| *value == 0.0)
 }
 
+/// The word that takes such offsets away: G52 with zero for each axis that has one.
+pub(super) fn list_zeros(of: &PerAxis<f64>, axes: AxisSet) -> String {
+    let with_offset = axes.iter().filter(|axis| of[*axis] != 0.0);
+    with_offset.fold("G52".to_owned(), |text, axis| format!("{text} {axis}0"))
+}
+
 /// Lists values of `axes` that are not zero, as the words that set them: `X10 Y-2.5`, mm and deg.
 pub(super) fn list(of: &PerAxis<f64>, axes: AxisSet) -> String {
     let mut text = String::new();

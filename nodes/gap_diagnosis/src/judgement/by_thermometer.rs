@@ -1,12 +1,15 @@
 //! Whether an effect of the temperatures is driven by a thermometer that the log goes with.
 //!
 //! A log that goes with thermometers on runs left out (`thermal`) says which body moves the tip. An effect of another body, and an
-//! event whose time nobody recorded, can follow the same curve for a while; neither is named then.
+//! event whose time nobody recorded, can follow the same curve for a while; neither is named then. Of the others a shift with the
+//! temperature of that body is tried (`thermal_shift`): the spindle's are its own growth.
+
+use std::collections::BTreeSet;
 
 use machine::file::SensorPlace;
-use twin::effects::Target;
+use twin::effects::{self, Target};
 
-use crate::judgement::cause::Member;
+use crate::judgement::cause::{Member, Scope};
 use crate::judgement::{Check, CheckId};
 use crate::noise::stack::Stack;
 use crate::report::figures::Note;
@@ -28,6 +31,41 @@ const DRIVEN: [(&str, &[SensorPlace]); 2] = [
 /// Effects that begin at an instant of their own.
 const EVENTS: [&str; 2] = ["coolant", "homing_shift"];
 
+/// The effect of one thermometer.
+pub(crate) const SHIFT: &str = "thermal_shift";
+
+/// Shifts with the thermometers that logs go with.
+pub(crate) fn shifts(scope: &Scope<'_, '_>, thermometers: &[Note]) -> Vec<Instance> {
+    let stack = scope.stack;
+    let is_left_out = scope.config.left_out.iter().any(|id| id == SHIFT);
+    let Some(kind) = effects::kind(SHIFT).filter(|_| !is_left_out && log::is_of_logs(stack)) else {
+        return vec![];
+    };
+    let reads_z = |channel: &str| channel.ends_with('Z');
+    let found = thermometers.iter().filter_map(|note| match note {
+        Note::GoesWith { channel, found } => Some((channel, found)),
+        _ => None,
+    });
+    let sensors = &stack.twin.machine().temperature_sensors;
+    let is_spindle = |id: &str| {
+        let own = sensors.iter().find(|sensor| sensor.id == id);
+        own.is_some_and(|own| DRIVEN[0].1.contains(&own.place))
+    };
+    let ids = found.flat_map(|(channel, found)| {
+        let kept = found.by.iter().map(|one| one.thermometer.clone());
+        kept.filter(move |id| !(reads_z(channel) && is_spindle(id)))
+    });
+    let ids: BTreeSet<String> = ids.collect();
+    let targets = ids.into_iter().map(Target::Thermometer);
+    targets
+        .map(|target| Instance {
+            kind,
+            target,
+            begins: None,
+        })
+        .collect()
+}
+
 /// Adds the check to the members of a session of logs that go with thermometers.
 pub(crate) fn check(
     stack: &Stack<'_>,
@@ -35,9 +73,7 @@ pub(crate) fn check(
     members: &mut [Member],
     thermometers: &[Note],
 ) {
-    let runs = stack.rows.blocks.iter().map(|block| block.run);
-    let mut all = runs.map(|run| log::is_log(&stack.session.runs[run]));
-    if !all.all(|is_log| is_log) {
+    if !log::is_of_logs(stack) {
         return;
     }
     for member in members {

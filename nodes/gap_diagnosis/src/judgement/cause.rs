@@ -19,6 +19,7 @@ use crate::judgement::form_doubt;
 use crate::judgement::plain::plainest;
 use crate::judgement::rule::Rule;
 use crate::judgement::unknown::{self, Leftover};
+use crate::judgement::unresolved;
 use crate::judgement::veto::{self, Veto};
 use crate::judgement::{self, Check, CheckId};
 use crate::noise::Noise;
@@ -139,7 +140,9 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let stack = scope.stack;
     let means = kinds.iter().filter(|kind| kind.moment == Moment::Mean);
     let instances = Instance::all(stack.twin.machine(), means);
-    let instances = Instance::with_begins(instances, scope.begins);
+    let mut instances = Instance::with_begins(instances, scope.begins);
+    let thermometers = thermal::notes(stack);
+    instances.extend(by_thermometer::shifts(scope, &thermometers));
     let mut signatures = Library::new(stack, instances);
     lines::add(stack, scope.slots, &mut signatures);
     widening::widen_curves(stack, &mut signatures);
@@ -163,8 +166,8 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     }
     let forms = isolability::forms(&signatures, &normal, &best.set);
     let mut members = veto::judged(scope, &signatures, &normal, &best, &forms, is_closed);
-    let thermometers = thermal::notes(stack);
     by_thermometer::check(stack, &signatures, &mut members, &thermometers);
+    unresolved::list_periodic(stack, &signatures, &mut members);
     resize(stack, &signatures, &normal, &mut members);
     while leave_out_small(stack, &signatures, &mut members) {
         resize(stack, &signatures, &normal, &mut members);

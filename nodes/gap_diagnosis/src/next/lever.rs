@@ -28,6 +28,7 @@ const LEVERS: [(&[&str], &str); 7] = [
             "column_bend",
             "ambient_drift",
             "coolant",
+            "thermal_shift",
             "workpiece_expansion",
         ],
         "a thermometer on the part in question, or heating it alone",

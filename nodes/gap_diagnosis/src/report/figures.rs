@@ -4,6 +4,7 @@
 
 use std::fmt;
 
+use metrology::number::decimals_of;
 use serde::{Deserialize, Serialize};
 
 use crate::judgement::veto::Veto;
@@ -265,7 +266,13 @@ fn by_thermometers(f: &mut fmt::Formatter<'_>, channel: &str, found: &ThermalFit
         } else {
             "without a lag".to_owned()
         };
-        format!("{} {lag}, {:.2} µm/K", one.thermometer, one.um_per_k)
+        let size = one.um_per_k.abs();
+        let error = one.standard_error_um_per_k;
+        let decimals = decimals_of(if error > 0.0 { error } else { 1e-2 * size });
+        format!(
+            "{} {lag}, {:.decimals$} µm/K",
+            one.thermometer, one.um_per_k
+        )
     };
     let percent = |share: f64| 100.0 * share.max(0.0);
     let terms: Vec<String> = found.by.iter().map(term).collect();

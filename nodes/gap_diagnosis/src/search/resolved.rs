@@ -9,7 +9,7 @@
 //!   r^2(f, g) = greatest eigenvalue of (c_f'c_f)^-1 c_f'c_g (c_g'c_g)^-1 c_g'c_f    (1)
 //! ```
 //!
-//! A period is resolved where neighbouring places lie closer than half of it often enough. Where they do not, as at the
+//! A period is resolved where enough neighbouring places in a row lie closer than half of it, over two periods. Where they do not, as at the
 //! targets of ISO 230-2, every wave is also a longer one: it is resolved only by many uneven places, at which (1) stays
 //! small for every other frequency. Any curve fits a few targets, and so does a wave.
 //!
@@ -35,8 +35,9 @@ use crate::search::signature::Instance;
 const ONE_PLACE: f64 = 0.02;
 /// Neighbours closer than this share of a period show how it goes on between them.
 const CLOSE: f64 = 0.45;
-/// So many close neighbours resolve a period.
+/// So many close neighbours in a row resolve a period, where they span so many of it: less of a wave is a curve.
 const ENOUGH_CLOSE: usize = 16;
+const MIN_PERIODS: f64 = 1.9;
 /// With fewer places than this a curve of any form (17 heights) fits as well as a wave.
 const FEWEST_PLACES: usize = 40;
 /// A curve needs so many targets.
@@ -151,9 +152,12 @@ fn places_mm(stack: &Stack<'_>, axis: Axis) -> Vec<f64> {
 fn resolves(places_mm: &[f64], period_mm: f64) -> bool {
     let mut apart = places_mm.to_vec();
     apart.dedup_by(|next, kept| *next - *kept < ONE_PLACE * period_mm);
-    let gaps = apart.windows(2).map(|two| two[1] - two[0]);
-    let close = gaps.filter(|gap| *gap < CLOSE * period_mm).count();
-    if close >= ENOUGH_CLOSE {
+    let mut rows = apart.chunk_by(|before, next| next - before < CLOSE * period_mm);
+    let shows = |row: &[f64]| match row {
+        [first, .., last] => row.len() > ENOUGH_CLOSE && last - first > MIN_PERIODS * period_mm,
+        _ => false,
+    };
+    if rows.any(shows) {
         return true;
     }
     apart.truncate(MAX_COMPARED);
@@ -266,6 +270,9 @@ mod tests {
             (even(41, 12.0), 10.0),
             (even(200, 12.0), 10.0),
             (even(13, 46.0), 0.004),
+            // A turn and a half; gaps of about half a period, some closer and some not.
+            (even(31, 0.5), 10.0),
+            (uneven(36, 180.0), 10.0),
         ] {
             assert!(
                 !resolves(&places, period_mm),

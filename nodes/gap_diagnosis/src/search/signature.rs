@@ -67,8 +67,8 @@ pub fn begin_s(run: &Run) -> Option<f64> {
     moves.or_else(|| run.touches.first().map(|touch| touch.time_s))
 }
 
-/// Kinds that go with time or temperature: when they begin is theirs to say.
-const OWN_TIME: [&str; 12] = [
+/// Kinds that go with time or temperature: when they begin is theirs to say. Readings whose order is not known show none of them.
+pub const OWN_TIME: [&str; 13] = [
     "ambient_drift",
     "clock_drift",
     "column_bend",
@@ -77,6 +77,7 @@ const OWN_TIME: [&str; 12] = [
     "latency_drift",
     "screw_elongation",
     "spindle_growth",
+    "thermal_shift",
     "thermometer_lag",
     "thermometer_noise",
     "thermometer_offset",

@@ -17,7 +17,7 @@ pub enum SessionError {
     NoSegments,
     /// Nothing was read in any run.
     #[error(
-        "none of the {segments} test segments holds a reading: record grid/position, length/position, probe/trigger, or motors that move"
+        "none of the {segments} test segments holds a reading: record grid/position, length/position, probe/trigger, or motors that move (angle/position alone has figures by abbe report, and no diagnosis)"
     )]
     NothingRead { segments: usize },
     /// The bag is of a machine with other axes.

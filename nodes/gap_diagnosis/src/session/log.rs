@@ -36,6 +36,7 @@
 use metrology::sample::{TestKind, TestSegment};
 use twin::{Channel, Run, Session};
 
+use crate::noise::stack::Stack;
 use crate::search::rows::{Block, count, time_s};
 
 /// Difference between repeats that is assumed for a log without repeats, µm (the repeatability of ISO 230-2 and -4 is
@@ -63,6 +64,12 @@ const PART: &str = "part ";
 /// Whether a run is a log.
 pub fn is_log(run: &Run) -> bool {
     run.segment.kind == TestKind::Dwell
+}
+
+/// Whether all that was read are logs.
+pub(crate) fn is_of_logs(stack: &Stack<'_>) -> bool {
+    let mut runs = stack.rows.blocks.iter().map(|block| block.run);
+    runs.all(|run| is_log(&stack.session.runs[run]))
 }
 
 /// Times of the rows of a block since the first, s.

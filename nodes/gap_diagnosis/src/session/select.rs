@@ -221,7 +221,7 @@ fn between_motions(motion: &Motion, lead_in: usize, counts: &mut [bool]) {
 
 /// From where the path is at the feed of the test for the first time to where it is for the last time: how the machine
 /// comes there and goes away, faster than that, is not what is tested. Where the record of a run holds the end of
-/// the one before, the longer part counts. Of a straight line only the passes at its feed count, once the loops have
+/// the one before, the part with more ticks that count is judged: those of the lead-in do not. Of a straight line only the passes at its feed count, once the loops have
 /// settled: what a jump of the acceleration at its ends leaves is told by how well the loops are known, not by the path.
 /// A test too short to reach its feed counts as a whole.
 fn on_the_way_of_the_test(segment: &TestSegment, motion: &Motion, counts: &mut [bool]) {
@@ -240,7 +240,8 @@ fn on_the_way_of_the_test(segment: &TestSegment, motion: &Motion, counts: &mut [
         let limit = segment.feed_mm_s + 5.0 * slack;
         between.iter().all(|speed| *speed < limit)
     };
-    let at_feed = |part: &&[Range<usize>]| part.iter().map(Range::len).sum::<usize>();
+    let counted = |pass: &Range<usize>| counts[pass.clone()].iter().filter(|one| **one).count();
+    let at_feed = |part: &&[Range<usize>]| part.iter().map(counted).sum::<usize>();
     let Some(part) = passes.chunk_by(is_slower).max_by_key(at_feed) else {
         return;
     };
@@ -297,6 +298,27 @@ mod tests {
         assert_eq!(stops.len(), 2, "{stops:?}");
         assert!((motion.time_s[stops[0].start] - 2.3).abs() < 0.02);
         assert!((motion.time_s[stops[0].end - 1] - 4.0).abs() < 0.02);
+    }
+
+    /// Two scans at 10 mm/s with a rapid way back between; the first, of the lead-in, is 0.5 s longer.
+    #[test]
+    fn a_longer_run_in_the_lead_in_does_not_take_the_place_of_the_run() {
+        let place = |t: f64| match t {
+            t if t < 2.5 => 10.0 * t,
+            t if t < 3.0 => 25.0 - 50.0 * (t - 2.5),
+            t => 10.0 * (t - 3.0),
+        };
+        let time_s: Vec<f64> = (0..5000).map(|k| f64::from(k) * 1e-3).collect();
+        let mut position = PerAxis::<Vec<f64>>::default();
+        position[Axis::X] = time_s.iter().map(|t| place(*t)).collect();
+        let motion = Motion::new(time_s, AxisSet::EMPTY.with(Axis::X), position).expect("a motion");
+        let segment = segment(TestKind::Line, 10.0);
+        let span = Selection::of(&segment, &motion, 2600, 0.3).span();
+        let [first_s, last_s] = [span.start, span.end - 1].map(|k| motion.time_s[k]);
+        assert!(
+            (first_s - 3.05).abs() < 5e-3 && last_s > 4.99,
+            "{first_s} {last_s}"
+        );
     }
 
     #[test]

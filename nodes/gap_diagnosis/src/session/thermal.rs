@@ -14,6 +14,9 @@
 //! less: two bodies that grow against each other show little of either, and the best thermometer alone is then none of the
 //! two. Nothing is chosen by its fit: a run (or a part of one log) is always predicted from the others.
 //!
+//! Sizes are of all runs; their standard errors are those of the jackknife over the runs \[3\], which neighbouring readings that
+//! share noise do not make too small.
+//!
 //! This finds what goes with what. Whether it is a cause, and which, is for the effects of the catalogue to show.
 //!
 //! # Holds when
@@ -21,7 +24,8 @@
 //! that (3) is rather too good than too bad.
 //!
 //! # References
-//! \[1\] D. M. Allen, Technometrics 16, 1974 (PRESS). \[2\] ISO 230-3:2020, clauses 5 and 6.
+//! \[1\] D. M. Allen, Technometrics 16, 1974 (PRESS). \[2\] ISO 230-3:2020, clauses 5 and 6. \[3\] R. G. Miller, Biometrika 61,
+//! 1974 (jackknife).
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -43,6 +47,9 @@ pub struct GoesWith {
     pub thermometer: String,
     /// Size, µm/K.
     pub um_per_k: f64,
+    /// Its standard error, by the sizes without one run each; zero where they are all the same, µm/K.
+    #[serde(default)]
+    pub standard_error_um_per_k: f64,
     /// Lag, min.
     pub lag_min: f64,
 }
@@ -116,6 +123,21 @@ struct Fold {
     square: f64,
 }
 
+/// The same of every run, and of all together.
+struct Sums {
+    folds: Vec<Fold>,
+    gram: DMatrix<f64>,
+    along: DVector<f64>,
+}
+
+impl Sums {
+    /// Sizes from all runs but one; none where they are not determined.
+    fn without(&self, fold: &Fold) -> Option<DVector<f64>> {
+        let rest = (&self.gram - &fold.gram).cholesky()?;
+        Some(rest.solve(&(&self.along - &fold.along)))
+    }
+}
+
 impl<'s> Search<'s> {
     /// None of too few runs for a prediction.
     fn new(stack: &'s Stack<'_>, blocks: &[&Block]) -> Option<Self> {
@@ -173,10 +195,12 @@ impl<'s> Search<'s> {
             }
         }
         let sizes = self.press(&best)?.1;
-        let by = best.iter().zip(sizes.iter().skip(1));
-        let of = |((id, lag_s), size): (&Term<'s>, &f64)| GoesWith {
+        let errors = self.standard_errors(&best);
+        let by = best.iter().zip(sizes.iter().zip(&errors).skip(1));
+        let of = |((id, lag_s), (size, error)): (&Term<'s>, (&f64, &f64))| GoesWith {
             thermometer: (*id).to_owned(),
             um_per_k: *size,
+            standard_error_um_per_k: *error,
             lag_min: lag_s / 60.0,
         };
         let named = |(press, (id, _)): &(f64, Term<'s>)| ((*id).to_owned(), share(*press));
@@ -272,6 +296,35 @@ impl<'s> Search<'s> {
 
     /// (2) of some terms, and the sizes from all runs: of the offset, then of each; none where they are not determined.
     fn press(&self, terms: &[Term<'s>]) -> Option<(f64, DVector<f64>)> {
+        let whole = self.summed(terms);
+        let mut press = 0.0;
+        for fold in &whole.folds {
+            let sizes = whole.without(fold)?;
+            let told = sizes.dot(&(&fold.gram * &sizes));
+            press += fold.square - 2.0 * sizes.dot(&fold.along) + told;
+        }
+        let sizes = whole.gram.cholesky()?.solve(&whole.along);
+        press.is_finite().then_some((press, sizes))
+    }
+
+    /// Standard errors of the sizes by the jackknife, of the offset first; zeros where a run cannot be left out.
+    fn standard_errors(&self, terms: &[Term<'s>]) -> Vec<f64> {
+        let whole = self.summed(terms);
+        let all: Option<Vec<DVector<f64>>> =
+            whole.folds.iter().map(|fold| whole.without(fold)).collect();
+        let all = all.unwrap_or_default();
+        let n = count(all.len().max(1));
+        let error = |k: usize| {
+            let sizes = || all.iter().map(|sizes| sizes[k]);
+            let mean = sizes().sum::<f64>() / n;
+            let squares: f64 = sizes().map(|size| (size - mean).powi(2)).sum();
+            ((n - 1.0) / n * squares).sqrt()
+        };
+        (0..=terms.len()).map(error).collect()
+    }
+
+    /// Sums of some terms, of each run and of all.
+    fn summed(&self, terms: &[Term<'s>]) -> Sums {
         let series: Vec<Rc<[f64]>> = terms.iter().map(|term| self.column(*term)).collect();
         let mut first = 0;
         let mut folds = Vec::<Fold>::with_capacity(self.folds.len());
@@ -286,16 +339,7 @@ impl<'s> Search<'s> {
             gram += &fold.gram;
             along += &fold.along;
         }
-        let mut press = 0.0;
-        for fold in &folds {
-            let sizes = (&gram - &fold.gram)
-                .cholesky()?
-                .solve(&(&along - &fold.along));
-            let told = sizes.dot(&(&fold.gram * &sizes));
-            press += fold.square - 2.0 * sizes.dot(&fold.along) + told;
-        }
-        let sizes = gram.cholesky()?.solve(&along);
-        press.is_finite().then_some((press, sizes))
+        Sums { folds, gram, along }
     }
 
     /// What a thermometer with a lag shows at the rows of all runs, K.

@@ -8,7 +8,7 @@
 use gap_diagnosis::judgement::CheckId;
 use gap_diagnosis::report::{Cause, Status};
 use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
-use gap_diagnosis::{Diagnosis, GapConfig, Note, diagnose};
+use gap_diagnosis::{Diagnosis, GapConfig, GoesWith, Note, ThermalFit, diagnose};
 use machine::MachineFile;
 use metrology::sample::{AxisState, LengthSample, TemperatureSample, TestKind, TestSegment};
 use metrology::stamp::Host;
@@ -337,6 +337,8 @@ fn of_two_thermometers_of_a_spindle_the_one_that_predicts_is_reported_with_its_l
     let rear = of("rear_bearing");
     assert!((rear.lag_min - 60.0).abs() < 5.0, "{found:#?}");
     assert!((rear.um_per_k - 0.93).abs() < 0.03, "{found:#?}");
+    let error = rear.standard_error_um_per_k;
+    assert!(error > 1e-4 && error < 0.03, "{found:#?}");
     assert!((of("bed").um_per_k + 3.2).abs() < 0.2, "{found:#?}");
     assert!(found.share > 0.99, "{found:#?}");
 }
@@ -370,4 +372,32 @@ fn noise_that_neighbouring_rows_share_hides_no_cause_of_a_log() {
         by_thermometer.is_some_and(|c| !c.has_failed()),
         "{cause:#?}"
     );
+}
+
+#[test]
+fn a_growth_is_shown_with_the_digits_that_its_error_justifies() {
+    let shown = |um_per_k: f64, standard_error_um_per_k: f64| {
+        let by = GoesWith {
+            thermometer: "bed".to_owned(),
+            um_per_k,
+            standard_error_um_per_k,
+            lag_min: 0.0,
+        };
+        let found = ThermalFit {
+            by: vec![by],
+            share: 0.9,
+            alone: vec![],
+        };
+        let channel = "length.X".to_owned();
+        Note::GoesWith { channel, found }.to_string()
+    };
+    for (value, error, wanted) in [
+        (0.0041, 0.0003, ", 0.00410 µm/K"),
+        (0.0041, 0.0, ", 0.00410 µm/K"),
+        (-3.2, 0.04, ", -3.200 µm/K"),
+        (12.0, 0.3, ", 12.00 µm/K"),
+    ] {
+        let text = shown(value, error);
+        assert!(text.contains(wanted), "{text}");
+    }
 }

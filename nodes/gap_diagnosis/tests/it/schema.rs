@@ -32,6 +32,15 @@ const FULL: &str = r#"{
 "does_not_repeat": [{"channel": "radial", "size_um": 5.0, "last_run": 3, "from_run": 4, "of_set_up": true, "chance": 1e-6}],
 "runtime_s": 1.3 }"#;
 
+/// What `abbe diagnose` adds to a report, where there is any.
+const ADDED: &str = r#"{
+"loss": [null, {"places": [{"file": "b_0.mcap"}], "left_out": [{"topic": "axes/state"}]}],
+"machine_defaults": ["axes.X.lead_mm = 10.0"],
+"simulated": {"bags": [{"path": "", "sha256": "", "runs": 1, "samples": 2}], "runs": {"matched": 1, "of": 2},
+  "readings": {"matched": 1, "of": 2}, "stood_in": [], "unmatched": []},
+"made_with": {"without": ["backlash"], "ablated": ["held_out"]},
+"alarms": {"state": "alarm", "figures": [{"figure": "gap.rms_um"}], "without_figure": ["gap.q"]} }"#;
+
 /// The sample by which the form was agreed, to the letter.
 const SAMPLE: &str = r#"{ "schema": "abbe.gap/1",
   "inputs": {"bags": [{"path":"","sha256":"","runs":0,"samples":0}], "machine_sha256": ""},
@@ -53,12 +62,14 @@ const SAMPLE: &str = r#"{ "schema": "abbe.gap/1",
   "runtime_s": 1.3 }"#;
 
 /// Keys that a report need not have, with their place.
-const OPTIONAL: [(&str, &str); 6] = [
+const OPTIONAL: [(&str, &str); 8] = [
     ("report", "over_session"),
     ("report", "does_not_repeat"),
     ("report", "loss"),
     ("report", "machine_defaults"),
     ("report", "simulated"),
+    ("report", "made_with"),
+    ("report", "alarms"),
     ("report.causes[]", "why"),
 ];
 
@@ -183,4 +194,31 @@ fn what_only_pages_tell_is_not_written_and_reports_of_before_that_had_it_are_rea
     assert_eq!(report.causes[0].parameters[0].determined, Some(false));
     let sample: Value = serde_json::from_str(SAMPLE).expect("JSON");
     assert_eq!(serde_json::to_value(report).expect("JSON"), sample);
+}
+
+#[test]
+fn a_report_with_every_key_that_is_written_is_read_back_equal() {
+    let mut whole: Value = serde_json::from_str(FULL).expect("JSON");
+    let added: Value = serde_json::from_str(ADDED).expect("JSON");
+    for (key, value) in added.as_object().expect("keys") {
+        let mut one: Value = serde_json::from_str(SAMPLE).expect("JSON");
+        one[key] = value.clone();
+        let report: GapReport = serde_json::from_value(one.clone()).expect(key);
+        assert_eq!(serde_json::to_value(report).expect("JSON"), one, "{key}");
+        whole[key] = value.clone();
+    }
+    let report: GapReport = serde_json::from_value(whole.clone()).expect("every key");
+    let written = serde_json::to_value(&report).expect("JSON");
+    assert_eq!(written, whole);
+    let again: GapReport = serde_json::from_value(written).expect("as written");
+    assert_eq!(again, report);
+    // And the schema has no key that was not tried.
+    let schema = schema();
+    let known = schema["properties"].as_object().expect("keys");
+    let tried = whole.as_object().expect("keys");
+    let untried: Vec<&String> = known
+        .keys()
+        .filter(|key| !tried.contains_key(*key))
+        .collect();
+    assert_eq!(untried, Vec::<&String>::new());
 }

@@ -275,6 +275,35 @@ fn a_lead_error_over_a_short_part_of_the_travel_has_the_shape_of_its_targets() {
     assert!(lost >= 27, "{lost} of 30 lost motions");
 }
 
+/// A wave with the screw's lead of 10 mm, at targets 20 to 60 mm apart: it may be a curve, and a curve may be it.
+#[test]
+fn an_error_of_the_screws_period_at_coarse_targets_is_one_of_a_set() {
+    let mut found = 0;
+    for seed in 0..12 {
+        let mut plant = Plant::drawn(seed);
+        let targets = plant.random.random_range(8..16_u32);
+        let mut at = |k: u32| {
+            let off: f64 = plant.random.random_range(-0.2..0.2);
+            -280.0 + 37.0 * (f64::from(k) + off)
+        };
+        plant.targets_mm = (0..targets).map(&mut at).collect();
+        plant.waves = vec![[6e-3, TAU / 10.0, 0.7]];
+        let diagnosis = measured(&mut plant);
+        for cause in diagnosis.report.causes.iter().filter(is_named) {
+            let is_curve = cause.effect == "pitch_error";
+            let mut open = cause.confusable_with.iter().filter(|it| !it.excluded);
+            let lists = open.any(|other| other.effect == "cyclic_error");
+            assert!(
+                !is_curve || (cause.status == Status::Set && lists),
+                "{seed}: {cause:?}"
+            );
+            assert_ne!(cause.effect, "cyclic_error", "{seed}: {cause:?}");
+            found += usize::from(is_curve);
+        }
+    }
+    assert!(found >= 10, "{found} of 12");
+}
+
 #[test]
 fn a_single_run_has_its_lead_error_and_its_lost_motion() {
     let single = |seed| Plant {

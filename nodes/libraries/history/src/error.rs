@@ -95,6 +95,44 @@ pub enum HistoryError {
         /// What was seen last.
         reason: String,
     },
+    /// A parameter of a URL.
+    #[error("history {path}: {key} = {value}: must be {must}", path = path.display())]
+    BadParameter {
+        /// Its URL without the password.
+        path: PathBuf,
+        /// Which.
+        key: &'static str,
+        /// Its value.
+        value: String,
+        /// What it may be.
+        must: &'static str,
+    },
+    /// A certificate, a key or a list of revoked certificates.
+    #[error("history {path}: {key} {file}: {reason}: name another PEM file in the URL", path = path.display(), file = file.display())]
+    BadTlsFile {
+        /// Its URL without the password.
+        path: PathBuf,
+        /// Which parameter of the URL names it.
+        key: &'static str,
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A server without TLS, where there must be TLS.
+    #[error("history {path}: the server offers no TLS: set `ssl = on` at the server, check that nobody stands between, or state sslmode=disable on a network that you trust; no password was sent", path = path.display())]
+    NoTls {
+        /// Its URL without the password.
+        path: PathBuf,
+    },
+    /// A server that is not who it must be, or does not accept the client's certificate.
+    #[error("history {path}: no TLS with this server ({reason}): check the host in the URL, sslrootcert, sslcert, and the dates of the certificates (docs/history.md); nothing was kept", path = path.display())]
+    Untrusted {
+        /// Its URL without the password.
+        path: PathBuf,
+        /// OpenSSL's words.
+        reason: String,
+    },
     /// The user of a server may not read or write.
     #[error("history {path}: the user may not do this: {reason}: grant it to the user (docs/history.md), or name another one in --store", path = path.display())]
     Refused {

@@ -27,6 +27,13 @@
 //!
 //! with u_T of temperatures and coefficients of expansion, u_R of the alignment, u_V of the drift of one reading.
 //!
+//! ```text
+//!   L_i = x̄ of both directions at the last target less that at the first,  lengths = max L_i − min L_i   (5)
+//!   lengths: u² = u_C² + u_T²(l₁ − l₂) + u_R²(l₁) + u_R²(l₂) + 2 (1/n) u_V²                            (6)
+//! ```
+//!
+//! (5) is what squareness makes of the diagonals, without the reversal; each L_i is of two means of 2n readings.
+//!
 //! Squareness makes diagonals unequal: an angle φ between X and Y alone changes P-P by about
 //! +φ X Y/L and N-P by −φ X Y/L, with L the diagonal's length. A scale error makes all of them long
 //! or short alike. The figures do not tell other errors apart.
@@ -108,6 +115,20 @@ pub struct DiagonalsResult {
     pub reversal: ExpandedLength,
     /// (3); not a figure of the standard.
     pub spread: ExpandedLength,
+    /// (5); not a figure of the standard.
+    pub lengths: ExpandedLength,
+}
+
+impl DiagonalResult {
+    /// L of (5): by how much the diagonal is too long, mm; NaN without a target.
+    #[must_use]
+    pub fn too_long_mm(&self) -> f64 {
+        let points = &self.positioning.points;
+        let mean = |point: Option<&PointResult>| {
+            point.map_or(f64::NAN, |p| f64::midpoint(p.up.mean_mm, p.down.mean_mm))
+        };
+        mean(points.last()) - mean(points.first())
+    }
 }
 
 /// Evaluates the four diagonals, given in any order.
@@ -151,15 +172,23 @@ pub fn evaluate(
         most.unwrap_or(ExpandedLength::new(0.0, 0.0))
     };
     let (systematic_error, reversal) = (of(|p| p.systematic_error), of(|p| p.reversal));
+    let (ends, means) = (means.iter().filter_map(|of| of.last()), means.concat());
+    let lengths: Vec<Mean> = { ends.zip(&diagonals) }
+        .map(|(end, of)| Mean {
+            mean_mm: of.too_long_mm(),
+            ..*end
+        })
+        .collect();
     Ok(DiagonalsResult {
         systematic_error,
         reversal,
-        spread: spread(&means.concat(), budget),
+        spread: range(&means, budget, 2.0),
+        lengths: range(&lengths, budget, 1.0),
         diagonals,
     })
 }
 
-/// A mean deviation on a diagonal.
+/// A mean deviation, or the length, of a diagonal.
 #[derive(Clone, Copy)]
 struct Mean {
     diagonal: SpaceDiagonal,
@@ -186,18 +215,18 @@ fn means(of: &DiagonalRuns, found: &PositioningResult) -> Vec<Mean> {
     found.points.iter().flat_map(sides).collect()
 }
 
-/// (3) and (4); there is a mean at least.
-fn spread(means: &[Mean], budget: &PositioningBudget) -> ExpandedLength {
+/// (3) and (4) with `drifts` = 2, (5) and (6) with 1: of each mean (drifts/n) u_V² of drift. There is a mean at least.
+fn range(means: &[Mean], budget: &PositioningBudget, drifts: f64) -> ExpandedLength {
     let by_mean = |a: &&Mean, b: &&Mean| a.mean_mm.total_cmp(&b.mean_mm);
     let (Some(high), Some(low)) = (means.iter().max_by(by_mean), means.iter().min_by(by_mean))
     else {
         return ExpandedLength::new(0.0, 0.0);
     };
     let apart = budget.over((high.length_mm - low.length_mm).abs(), high.span_mm);
-    let drift_mm = (2.0 / high.n_runs as f64).sqrt() * apart.drift_mm;
+    let drift_mm = |m: &Mean| (drifts / m.n_runs as f64).sqrt() * apart.drift_mm;
     let value_mm = high.mean_mm - low.mean_mm;
     if high.diagonal == low.diagonal {
-        return ExpandedLength::new(value_mm, apart.length_part_mm().hypot(drift_mm));
+        return ExpandedLength::new(value_mm, apart.length_part_mm().hypot(drift_mm(high)));
     }
     let constant_mm = budget.device.standard_mm(0.0);
     let scale_mm = |length_mm: f64| budget.device.standard_mm(length_mm) - constant_mm;
@@ -217,8 +246,8 @@ fn spread(means: &[Mean], budget: &PositioningBudget) -> ExpandedLength {
         apart.device_expansion_mm,
         aligned(high),
         aligned(low),
-        drift_mm,
-        (2.0 / low.n_runs as f64).sqrt() * apart.drift_mm,
+        drift_mm(high),
+        drift_mm(low),
     ]);
     ExpandedLength::new(value_mm, u_mm)
 }

@@ -1,7 +1,7 @@
 //! Positions of the axes, put together from values that come one by one.
 //!
-//! Values with one stamp belong together: they give one state, once another stamp comes or nothing has come for
-//! [`SETTLE`]. An axis that is absent is not in the state. After a start and after a break of the connection, the
+//! Values with one stamp belong together: they give one state, once another stamp comes, another value of the same axis, or
+//! nothing has come for [`SETTLE`]. A clock of whole seconds stamps many positions alike: each is a state of its own. An axis that is absent is not in the state. After a start and after a break of the connection, the
 //! axes come one by one: no state is given until each axis of the mapping has come or is absent, at most for
 //! [`GATHER`]. The velocity is that between two stamps,
 //!
@@ -26,6 +26,8 @@ pub const GATHER: Span = Span::from_nanos(5_000_000_000);
 struct Open {
     machine_at: Stamp<Machine>,
     received_at: Stamp<Host>,
+    /// Axes whose position is in it, and those whose command is.
+    heard: [AxisSet; 2],
 }
 
 /// Puts states together.
@@ -70,8 +72,14 @@ impl Positions {
         machine_at: Stamp<Machine>,
         received_at: Stamp<Host>,
     ) -> Option<AxisState> {
-        let is_other = self.open.is_some_and(|open| open.machine_at != machine_at);
-        let whole = if is_other { self.take() } else { None };
+        let is_other = |open: Open| {
+            open.machine_at != machine_at || open.heard[usize::from(commanded)].contains(axis)
+        };
+        let whole = if self.open.is_some_and(is_other) {
+            self.take()
+        } else {
+            None
+        };
         if commanded {
             self.commanded[axis] = Some(position);
         } else {
@@ -87,9 +95,12 @@ impl Positions {
             self.actual[axis] = position;
             self.told_at[axis] = machine_at;
         }
+        let mut heard = self.open.map_or([AxisSet::EMPTY; 2], |open| open.heard);
+        heard[usize::from(commanded)] = heard[usize::from(commanded)].with(axis);
         self.open = Some(Open {
             machine_at,
             received_at,
+            heard,
         });
         self.first_at.get_or_insert(received_at);
         whole
@@ -169,6 +180,30 @@ mod tests {
         assert!((second.velocity[Axis::X] - 4.0).abs() < 1e-12);
         assert_eq!(second.controller_at, at(1.5));
         assert!(positions.settled(host(99.0)).is_none());
+    }
+
+    #[test]
+    fn each_of_many_positions_with_one_stamp_is_a_state() {
+        let mut positions = Positions::default();
+        let mut told = vec![];
+        for k in 0..10_u8 {
+            told.extend(positions.hear(Axis::X, false, f64::from(k), at(1.0), host(9.0)));
+        }
+        told.extend(positions.settled(host(9.2)));
+        let places: Vec<f64> = told.iter().map(|state| state.motor[Axis::X]).collect();
+        assert_eq!(places, (0..10_u8).map(f64::from).collect::<Vec<_>>());
+        // Another axis and the command of this one are of the same state.
+        positions.hear(Axis::X, false, 1.0, at(2.0), host(10.0));
+        assert!(
+            positions
+                .hear(Axis::X, true, 1.5, at(2.0), host(10.0))
+                .is_none()
+        );
+        assert!(
+            positions
+                .hear(Axis::Y, false, 3.0, at(2.0), host(10.0))
+                .is_none()
+        );
     }
 
     #[test]

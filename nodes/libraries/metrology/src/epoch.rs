@@ -15,11 +15,25 @@ pub const END_NANOS: i64 = END_S * NANOS_PER_S;
 const LIKELY_FROM_S: f64 = 631_152_000.0;
 
 /// An instant as a date and a time of the day in UTC, whole seconds: `2026-01-05 08:15:00 UTC`.
+#[must_use]
+pub fn utc<C: Clock>(at: Stamp<C>) -> String {
+    utc_of_nanos(at.nanos(), 0)
+}
+
+/// An instant in ns since 1970 as a date and a time of the day in UTC with so many decimals of the second, nine at most:
+/// `2026-01-05 08:15:00.250 UTC`. What lies behind the last decimal is left out.
 ///
 /// Days become dates by the eras of 400 years of the Gregorian calendar, counted from 1 March so that the leap day is the last.
 #[must_use]
-pub fn utc<C: Clock>(at: Stamp<C>) -> String {
-    let seconds = at.nanos().div_euclid(NANOS_PER_S);
+pub fn utc_of_nanos(nanos: impl Into<i128>, decimals: usize) -> String {
+    let (nanos, per_s) = (nanos.into(), i128::from(NANOS_PER_S));
+    let bound = i128::from(i64::MAX);
+    let seconds = nanos.div_euclid(per_s).clamp(-bound / 2, bound / 2) as i64;
+    let fraction = format!("{:09}", nanos.rem_euclid(per_s));
+    let fraction = match fraction.get(..decimals) {
+        None | Some("") => String::new(),
+        Some(digits) => format!(".{digits}"),
+    };
     let (days, of_day) = (seconds.div_euclid(86_400), seconds.rem_euclid(86_400));
     // 719 468 days lie between 0000-03-01 and 1970-01-01; an era has 146 097.
     let since = days + 719_468;
@@ -36,7 +50,7 @@ pub fn utc<C: Clock>(at: Stamp<C>) -> String {
     };
     let year = year + 400 * era + i64::from(month <= 2);
     let (hour, minute, second) = (of_day / 3600, of_day / 60 % 60, of_day % 60);
-    format!("{year:04}-{month:02}-{date:02} {hour:02}:{minute:02}:{second:02} UTC")
+    format!("{year:04}-{month:02}-{date:02} {hour:02}:{minute:02}:{second:02}{fraction} UTC")
 }
 
 /// A number of seconds with every digit of a whole one, as it stands in the file.
@@ -150,6 +164,33 @@ mod tests {
             utc(Stamp::<Host>::from_nanos(i64::MIN)),
             "1677-09-21 00:12:43 UTC"
         );
+    }
+
+    /// Dates by `date -u -d @1700003585.25` and, of the last log time that a bag can hold, `date -u -d @18446744073`.
+    #[test]
+    fn val_decimals_of_a_second_are_as_many_as_wanted() {
+        for (nanos, decimals, wanted) in [
+            (
+                1_700_003_585_250_000_000_u64,
+                3,
+                "2023-11-14 23:13:05.250 UTC",
+            ),
+            (1_700_003_585_250_999_999, 3, "2023-11-14 23:13:05.250 UTC"),
+            (
+                1_700_003_585_000_000_007,
+                9,
+                "2023-11-14 23:13:05.000000007 UTC",
+            ),
+            (1_700_003_585_250_000_000, 0, "2023-11-14 23:13:05 UTC"),
+            (0, 3, "1970-01-01 00:00:00.000 UTC"),
+            (u64::MAX, 0, "2554-07-21 23:34:33 UTC"),
+        ] {
+            assert_eq!(utc_of_nanos(nanos, decimals), wanted);
+        }
+        assert_eq!(utc_of_nanos(-250_000_000, 3), "1969-12-31 23:59:59.750 UTC");
+        for extreme in [i128::MAX, i128::MIN] {
+            assert!(utc_of_nanos(extreme, 3).ends_with(" UTC"));
+        }
     }
 
     /// Dates by `date -u -d @4294967295`.

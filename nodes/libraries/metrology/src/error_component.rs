@@ -79,6 +79,36 @@ impl ErrorComponent {
     pub const fn is_angular(self) -> bool {
         !self.direction.is_linear()
     }
+
+    /// In words for who does not know the symbols of ISO 230-1: `straightness of X along Y`, `squareness of Y to X`.
+    #[must_use]
+    pub fn in_words(self) -> String {
+        let of = self.of;
+        let about = match self.direction {
+            Axis::X | Axis::A => Axis::X,
+            Axis::Y | Axis::B => Axis::Y,
+            Axis::Z | Axis::C => Axis::Z,
+        };
+        let is_own = self.direction == of;
+        match (self.is_location, self.is_angular(), of.is_linear()) {
+            // Two linear axes lie in the plane that stands upright on the axis of the turn.
+            (true, true, true) => Axis::LINEAR
+                .into_iter()
+                .find(|other| *other != of && *other != about)
+                .map_or_else(
+                    || format!("orientation of {of} about {about}"),
+                    |other| format!("squareness of {of} to {other}"),
+                ),
+            (true, true, false) => format!("orientation of axis {of} about {about}"),
+            (true, false, _) => format!("location of axis {of} along {about}"),
+            (false, _, _) if is_own => format!("positioning of {of}"),
+            (false, false, true) => format!("straightness of {of} along {about}"),
+            (false, true, true) if of == about => format!("roll of {of}"),
+            (false, true, true) => format!("rotation of {of} about {about}"),
+            (false, false, false) => format!("error motion of {of} along {about}"),
+            (false, true, false) => format!("tilt of {of} about {about}"),
+        }
+    }
 }
 
 impl fmt::Display for ErrorComponent {
@@ -117,6 +147,28 @@ mod tests {
     fn names_are_those_of_iso_230_1_and_round_trip() {
         for name in ["EXX", "EYX", "ECX", "EC0Y", "EX0C", "EA0Z", "EAC"] {
             assert_eq!(name.parse::<ErrorComponent>().unwrap().to_string(), name);
+        }
+    }
+
+    /// Names of ISO 230-1:2012, 3.4 to 3.6, of linear axes and of the axis C of a spindle.
+    #[test]
+    fn val_iso_230_1_components_have_words() {
+        for (name, words) in [
+            ("EXX", "positioning of X"),
+            ("EYX", "straightness of X along Y"),
+            ("EAX", "roll of X"),
+            ("ECY", "rotation of Y about Z"),
+            ("EC0Y", "squareness of Y to X"),
+            ("EB0Z", "squareness of Z to X"),
+            ("EA0Z", "squareness of Z to Y"),
+            ("ECC", "positioning of C"),
+            ("EXC", "error motion of C along X"),
+            ("EAC", "tilt of C about X"),
+            ("EX0C", "location of axis C along X"),
+            ("EA0C", "orientation of axis C about X"),
+        ] {
+            let component: ErrorComponent = name.parse().unwrap();
+            assert_eq!(component.in_words(), words);
         }
     }
 

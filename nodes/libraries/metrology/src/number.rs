@@ -29,6 +29,16 @@ pub fn number(value: f64) -> String {
     }
 }
 
+/// Decimals of a value, of whose uncertainty two digits are shown; 2 without one.
+#[must_use]
+pub fn decimals_of(uncertainty: f64) -> usize {
+    if uncertainty.is_finite() && uncertainty > 0.0 {
+        (1.0 - uncertainty.log10().floor()).clamp(0.0, 9.0) as usize
+    } else {
+        2
+    }
+}
+
 /// A number with the unit of its name: `12.5 mm`; a name without a unit gives the number alone.
 #[must_use]
 pub fn quantity(name: &str, value: f64) -> String {

@@ -24,11 +24,13 @@ use crate::names::{self, NodeNames};
 use crate::network::{Guid, Remote, Role};
 use absent::Absent;
 use first_sample::FirstSamples;
+use peers::{Peers, Way};
 use reply::LongReplies;
 
 mod absent;
 mod endpoint;
 mod first_sample;
+mod peers;
 mod policies;
 mod ports;
 mod reply;
@@ -125,6 +127,31 @@ impl ByHand {
     }
 }
 
+/// What is done about other hosts, where there may be some.
+struct Others {
+    _absent: Option<Absent>,
+    _peers: Option<Peers>,
+}
+
+/// What is said of named hosts where nothing can be done.
+const UNREACHED: &str = "ROS_STATIC_PEERS is not followed: the graph is encrypted and no interface has the MULTICAST flag; \
+    `ip link set DEVICE multicast on` cures it, also where the network carries none";
+
+/// The way to the named hosts, and a warning of those without an address.
+fn way_to_peers(
+    environment: &Environment,
+    interfaces: &[environment::Interface],
+) -> anyhow::Result<(Option<Way>, Option<String>)> {
+    let (hosts, unknown) = peers::resolve(environment.reachable_peers());
+    let way = Way::to(&hosts, environment.domain_id, interfaces)
+        .context("multicast, for ROS_STATIC_PEERS")?;
+    let unfound = (!unknown.is_empty()).then(|| {
+        let names = unknown.join(", ");
+        format!("ROS_STATIC_PEERS: no IPv4 address of {names}; start again when the name is known")
+    });
+    Ok((way, unfound))
+}
+
 /// Participants whose nodes are kept by name.
 const MOST_NEIGHBOURS: usize = 1_000;
 /// Nodes of one participant that are named.
@@ -144,8 +171,7 @@ pub(crate) struct Participant {
     neighbours: Mutex<BTreeMap<[u8; 12], String>>,
     /// What is sent past the library; nothing where packets are encrypted.
     by_hand: Option<ByHand>,
-    /// Where there may be other hosts.
-    _absent: Option<Absent>,
+    _others: Others,
     participant: DomainParticipant,
 }
 
@@ -159,6 +185,7 @@ impl Participant {
         let interfaces = environment::interfaces();
         environment.check_interfaces(&interfaces)?;
         let (_, unsecured) = secured(builder(environment), environment, names)?;
+        let (way, unfound) = way_to_peers(environment, &interfaces)?;
         let participant = ports::with_its_port(|| {
             let (builder, _) = secured(builder(environment), environment, names)?;
             let domain = environment.domain_id;
@@ -172,20 +199,26 @@ impl Participant {
             .transpose()
             .context("announcements of other hosts")?;
         let is_encrypted = environment.security.is_some() && unsecured.is_none();
-        let peers = environment.peers_warning();
+        let is_unreached = is_encrypted && way.as_ref().is_some_and(Way::needs_stand_ins);
+        let unreached = is_unreached.then(|| UNREACHED.to_owned());
+        let peers = environment.peers_warning().or(unfound).or(unreached);
+        let others = Others {
+            _absent: absent,
+            _peers: way.map(|way| way.reach(&participant)),
+        };
         let warnings: Vec<String> = unsecured.into_iter().chain(hidden).chain(peers).collect();
         let warning = (!warnings.is_empty()).then(|| warnings.join("; "));
         let node = NodeName::new(&names.namespace, &names.name)
             .map_err(|error| anyhow!("node {}: {error:?}", names.fully_qualified()))?;
         Ok((
-            Self::of(participant, absent, node, is_encrypted).context("ROS graph on DDS")?,
+            Self::of(participant, others, node, is_encrypted).context("ROS graph on DDS")?,
             warning,
         ))
     }
 
     fn of(
         participant: DomainParticipant,
-        absent: Option<Absent>,
+        others: Others,
         node: NodeName,
         is_encrypted: bool,
     ) -> anyhow::Result<Self> {
@@ -212,7 +245,7 @@ impl Participant {
         };
         Ok(Self {
             by_hand,
-            _absent: absent,
+            _others: others,
             participant,
             publisher,
             subscriber,

@@ -66,8 +66,8 @@ pub struct Environment {
     pub security: Option<Security>,
     /// How far discovery goes.
     pub range: DiscoveryRange,
-    /// `ROS_STATIC_PEERS`, which no node of ours follows.
-    pub static_peers: Option<String>,
+    /// `ROS_STATIC_PEERS`: IPv4 addresses or names of hosts.
+    pub static_peers: Vec<String>,
     /// `RUST_LOG`.
     pub log_filter: Option<String>,
 }
@@ -210,7 +210,7 @@ impl Environment {
             domain_id,
             security,
             range,
-            static_peers: set("ROS_STATIC_PEERS"),
+            static_peers: static_peers(set)?,
             log_filter: set("RUST_LOG"),
         })
     }
@@ -240,14 +240,24 @@ impl Environment {
         }
     }
 
-    /// What to warn of where hosts are named that are to be found without multicast.
+    /// The hosts that are to be found without multicast; none where discovery stays on this computer.
+    #[must_use]
+    pub fn reachable_peers(&self) -> &[String] {
+        match self.range {
+            DiscoveryRange::Subnet => &self.static_peers,
+            DiscoveryRange::Localhost => &[],
+        }
+    }
+
+    /// What to warn of where hosts are named that are not looked for.
     #[must_use]
     pub fn peers_warning(&self) -> Option<String> {
-        let peers = self.static_peers.as_ref()?;
-        Some(format!(
-            "ROS_STATIC_PEERS={peers} is not followed: over DDS hosts are found by multicast alone; \
-             where the network carries none, use Zenoh (RMW_IMPLEMENTATION=rmw_zenoh_cpp)"
-        ))
+        let is_followed = self.reachable_peers().len() == self.static_peers.len();
+        (!is_followed).then(|| {
+            "ROS_STATIC_PEERS is not followed: discovery is limited to this computer; \
+             set ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET"
+                .to_owned()
+        })
     }
 
     /// What to warn of when this is the `participant`-th participant of the computer, from 0.
@@ -269,6 +279,33 @@ impl Environment {
              the first {PARTICIPANTS_WITHOUT_MULTICAST} find each other; `ip link set lo multicast on` cures it"
         ))
     }
+}
+
+/// Most hosts that are named.
+const MOST_PEERS: usize = 32;
+
+/// The named hosts.
+fn static_peers(
+    set: impl Fn(&'static str) -> Option<String>,
+) -> Result<Vec<String>, EnvironmentError> {
+    let value = set("ROS_STATIC_PEERS").unwrap_or_default();
+    let names = value.split(';').map(str::trim);
+    let names: Vec<String> = names
+        .filter(|name| !name.is_empty())
+        .map(str::to_owned)
+        .collect();
+    let is_name = |name: &String| {
+        let mut all = name.chars();
+        all.all(|one| one.is_ascii_alphanumeric() || matches!(one, '.' | '-' | '_'))
+    };
+    if names.len() <= MOST_PEERS && names.iter().all(is_name) {
+        return Ok(names);
+    }
+    Err(EnvironmentError::BadVariable {
+        variable: "ROS_STATIC_PEERS",
+        value,
+        allowed: "at most 32 IPv4 addresses or host names, with `;` between them and without ports",
+    })
 }
 
 /// What carries the graph, and how Zenoh is set up where it does.
@@ -358,16 +395,27 @@ mod tests {
     }
 
     #[test]
-    fn peers_that_nobody_follows_are_told() {
-        let environment = read(&[("ROS_STATIC_PEERS", "10.0.0.7")]).unwrap();
-        let warning = environment.peers_warning().unwrap();
-        assert!(
-            warning.contains("ROS_STATIC_PEERS=10.0.0.7 is not followed"),
-            "{warning}"
-        );
-        assert_eq!(read(&[]).unwrap().peers_warning(), None);
+    fn peers_are_named_with_semicolons_and_not_followed_on_this_computer_alone() {
+        let peers = ("ROS_STATIC_PEERS", "10.0.0.7; cell-pc.local;");
+        let environment = read(&[peers]).unwrap();
+        assert_eq!(environment.reachable_peers(), ["10.0.0.7", "cell-pc.local"]);
+        assert_eq!(environment.peers_warning(), None);
+        for range in [
+            "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST",
+            "ROS_LOCALHOST_ONLY=1",
+        ] {
+            let environment = read(&[peers, range.split_once('=').unwrap()]).unwrap();
+            assert!(environment.reachable_peers().is_empty());
+            let warning = environment.peers_warning().unwrap();
+            assert!(warning.contains("RANGE=SUBNET"), "{warning}");
+        }
         let unset = read(&[("ROS_STATIC_PEERS", "")]).unwrap();
-        assert_eq!(unset.peers_warning(), None);
+        assert_eq!(unset, Environment::default());
+        let many = ["10.0.0.7"; 33].join(";");
+        for bad in ["10.0.0.7:7410", "fe80::1", "10.0.0.7,10.0.0.8", &many] {
+            let error = read(&[("ROS_STATIC_PEERS", bad)]).unwrap_err().to_string();
+            assert!(error.contains("at most 32 IPv4"), "{error}");
+        }
     }
 
     #[test]

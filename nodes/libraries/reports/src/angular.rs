@@ -11,9 +11,13 @@ use crate::evaluate::Tests;
 use crate::evaluate::angular::RotaryTest;
 use crate::evaluate::budget::{Budget, unstate};
 use crate::evaluate::linear::STOP_SETTLE;
+use crate::positioning::with_u;
 
 /// Seconds of arc of a radian.
 const ARCSEC_PER_RAD: f64 = 648_000.0 / std::f64::consts::PI;
+
+/// What a test of one run does not show, behind its first sentence.
+const NO_SCATTER: &str = " Repeatability R and accuracy A need at least 2 runs, 5 by the standard; the scatter of single readings is in the figures of this test.";
 
 /// A reference of which nothing is stated.
 const NOTHING: RotaryBudget = RotaryBudget {
@@ -56,6 +60,7 @@ fn section(test: &RotaryTest, budget: Option<&Budget>) -> Result<Section> {
         }
     }
     section.tell_left_out(&test.left_out);
+    section.name_far(&test.outlying.far);
     Ok(section)
 }
 
@@ -94,20 +99,18 @@ fn fill(
         }
     };
     let deg = |rad: Option<&f64>| rad.map_or(f64::NAN, |rad| rad.to_degrees());
+    let (counted, lacking) = match result.n_runs {
+        1 => ("1 run".to_owned(), NO_SCATTER),
+        n => (format!("{n} runs"), ""),
+    };
     section.lines.push(format!(
-        "{} targets from {:.3} to {:.3} deg, {} runs {way}.",
+        "{} targets from {:.3} to {:.3} deg, {counted} {way}.{lacking}",
         test.targets_rad.len(),
         deg(test.targets_rad.first()),
         deg(test.targets_rad.last()),
-        result.n_runs
     ));
     section.lines.extend(result.remarks.iter().map(in_words));
-    let accuracy = result.both.map(|one| one.accuracy);
-    let accuracy = accuracy.or(result.up.map(|one| one.accuracy));
-    let accuracy = accuracy.or(result.down.map(|one| one.accuracy));
-    section
-        .answers
-        .push(format!("accuracy A {} arcsec.", cell(accuracy, stated)));
+    section.answers.push(answer(result, stated));
     section.tables.push(table(result, stated));
     section.drawings.push(drawing(result)?);
     let mut figures = serde_json::json!({ "axis": test.axis.letter(), "figures": result });
@@ -120,6 +123,37 @@ fn fill(
         "left_out": test.left_out,
     });
     Ok(())
+}
+
+/// The figures in a sentence: accuracy, or what a single run has.
+fn answer(result: &RotaryResult, stated: bool) -> String {
+    let shown = |value: ExpandedAngle| format!("{} arcsec", cell(Some(value), stated));
+    let both = result.both;
+    let sides = [("A↑", result.up), ("A↓", result.down)];
+    let mut of_sides = sides
+        .into_iter()
+        .filter_map(|(name, side)| Some((name, side?.accuracy?)));
+    let accuracy = match both {
+        Some(both) => both.accuracy.map(|value| ("A", value)),
+        None => of_sides.next(),
+    };
+    if let Some((name, value)) = accuracy {
+        return format!("accuracy {name} {}.", shown(value));
+    }
+    let words = match (both, result.up, result.down) {
+        (Some(both), ..) => format!(
+            "systematic deviation E {}, range of means M {}, reversal B {}",
+            shown(both.systematic_error),
+            shown(both.mean_systematic_error),
+            shown(both.reversal)
+        ),
+        (None, Some(up), _) => format!("systematic deviation E↑ {}", shown(up.systematic_error)),
+        (None, None, Some(down)) => {
+            format!("systematic deviation E↓ {}", shown(down.systematic_error))
+        }
+        (None, None, None) => "no direction has a reading".to_owned(),
+    };
+    format!("one run: {words}; repeatability R and accuracy A need more runs.")
 }
 
 fn in_words(remark: &RotaryRemark) -> String {
@@ -141,58 +175,64 @@ fn cell(value: Option<ExpandedAngle>, stated: bool) -> String {
     };
     let arcsec = value.value_rad * ARCSEC_PER_RAD;
     if stated {
-        let expanded = value.expanded_uncertainty_rad * ARCSEC_PER_RAD;
-        format!("{arcsec:.2} ± {expanded:.2}")
+        with_u(arcsec, value.expanded_uncertainty_rad * ARCSEC_PER_RAD)
     } else {
         format!("{arcsec:.2}")
     }
 }
 
 fn table(result: &RotaryResult, stated: bool) -> Rows {
-    let cell = |value: Option<ExpandedAngle>| cell(value, stated);
     let (up, down, both) = (result.up, result.down, result.both);
-    let row = |name: &str, values: [Option<ExpandedAngle>; 3]| {
-        std::iter::once(name.to_owned())
-            .chain(values.map(cell))
-            .collect()
+    let row = |name: &str, values: [Option<ExpandedAngle>; 3]| -> Vec<String> {
+        let cells = values.map(|value| cell(value, stated));
+        std::iter::once(name.to_owned()).chain(cells).collect()
+    };
+    let of_scatter = |name: &str, values: [Option<Option<ExpandedAngle>>; 3]| {
+        row(name, values.map(Option::flatten))
+    };
+    let accuracy = of_scatter(
+        "accuracy A",
+        [
+            up.map(|one| one.accuracy),
+            down.map(|one| one.accuracy),
+            both.map(|one| one.accuracy),
+        ],
+    );
+    let systematic = row(
+        "systematic deviation E",
+        [
+            up.map(|one| one.systematic_error),
+            down.map(|one| one.systematic_error),
+            both.map(|one| one.systematic_error),
+        ],
+    );
+    let repeatability = of_scatter(
+        "repeatability R",
+        [
+            up.map(|one| one.repeatability),
+            down.map(|one| one.repeatability),
+            both.map(|one| one.repeatability),
+        ],
+    );
+    let of_both = |name: &str, value: Option<ExpandedAngle>| row(name, [None, None, value]);
+    let of_both = [
+        of_both("reversal B", both.map(|one| one.reversal)),
+        of_both("mean reversal", both.map(|one| one.mean_reversal)),
+        of_both(
+            "range of means M",
+            both.map(|one| one.mean_systematic_error),
+        ),
+    ];
+    let (title, rows) = match result.n_runs {
+        1 => ("ISO 230-2, one run / arcsec", vec![systematic]),
+        _ => (
+            "ISO 230-2 / arcsec",
+            vec![accuracy, systematic, repeatability],
+        ),
     };
     Rows {
-        head: head(&["ISO 230-2 / arcsec", "up", "down", "both"]),
-        rows: vec![
-            row(
-                "accuracy A",
-                [
-                    up.map(|one| one.accuracy),
-                    down.map(|one| one.accuracy),
-                    both.map(|one| one.accuracy),
-                ],
-            ),
-            row(
-                "systematic deviation E",
-                [
-                    up.map(|one| one.systematic_error),
-                    down.map(|one| one.systematic_error),
-                    both.map(|one| one.systematic_error),
-                ],
-            ),
-            row(
-                "repeatability R",
-                [
-                    up.map(|one| one.repeatability),
-                    down.map(|one| one.repeatability),
-                    both.map(|one| one.repeatability),
-                ],
-            ),
-            row("reversal B", [None, None, both.map(|one| one.reversal)]),
-            row(
-                "mean reversal",
-                [None, None, both.map(|one| one.mean_reversal)],
-            ),
-            row(
-                "range of means M",
-                [None, None, both.map(|one| one.mean_systematic_error)],
-            ),
-        ],
+        head: head(&[title, "up", "down", "both"]),
+        rows: rows.into_iter().chain(of_both).collect(),
         note: if stated {
             "± expanded uncertainty, k = 2.".to_owned()
         } else {

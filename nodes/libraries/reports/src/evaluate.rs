@@ -3,14 +3,13 @@
 //! A bag is read once, in the order of time; what is kept is no more than the readings of its tests.
 
 use abbe_msgs::topics;
-use gap_diagnosis::session::outside_travel;
 use machine::MachineFile;
 use metrology::sample::{
     AxisCompensation, AxisState, BlockMeasurement, GeometryModel, PositioningTable, ProbedFeature,
     ProbedPoint, TestSegment,
 };
 use recorder::{Bag, Loss, LossReason, Order};
-use replayer::{Reading, Reason, Taken, reading};
+use replayer::{Reading, Taken, reading};
 
 pub mod angular;
 mod belonging;
@@ -20,11 +19,14 @@ pub mod circles;
 pub mod correction;
 pub mod course;
 pub mod drift;
+pub mod imported;
 pub mod limits;
 pub mod linear;
+mod not_evaluated;
 pub mod paths;
 pub mod stationwise;
 pub mod stops;
+mod strays;
 pub mod test_conditions;
 
 use crate::machine_defaults;
@@ -34,10 +36,13 @@ use belonging::Belonging;
 pub use belonging::BrokenOff;
 use circles::{CircleRecording, Circles};
 use drift::{Drift, Drifts};
+use imported::Imported;
 use linear::{LinearRuns, LinearTest};
+pub use not_evaluated::NotEvaluated;
 use paths::{PathRecording, Paths};
 use stationwise::{StationCircle, Stationwise};
 use stops::{StopRuns, Stops};
+use strays::Strays;
 use test_conditions::TestConditions;
 
 /// Topics that evaluations read.
@@ -100,6 +105,8 @@ pub struct Tests {
     pub tables: Vec<PositioningTable>,
     /// Runs that the machine did not complete: nothing of them is evaluated.
     pub broken_off: Vec<BrokenOff>,
+    /// Runs that were measured and cannot be evaluated.
+    pub not_evaluated: Vec<NotEvaluated>,
     /// Under which conditions the tests ran.
     pub conditions: TestConditions,
     /// The machine file of the bag, where it can be read.
@@ -122,6 +129,7 @@ struct Collected {
     drifts: Drifts,
     stops: StopRuns,
     belonging: Belonging,
+    strays: Strays,
     segment: Option<TestSegment>,
 }
 
@@ -137,6 +145,7 @@ impl Tests {
         let (machine, left_out) = machine.unzip();
         let mut collected = Collected {
             stationwise: Stationwise::new(machine.as_ref()),
+            belonging: Belonging::of(has_grid(bag)),
             ..Collected::default()
         };
         collected.tests.machine = machine;
@@ -145,10 +154,13 @@ impl Tests {
         });
         let mut tests = collected.tests;
         tests.reading = reading;
+        tests.conditions.imported = Imported::of(bag);
         tests.lose_machine(bag, unreadable);
-        tests.broken_off = collected.belonging.finish(&mut tests.reading.account);
+        let runs = collected.belonging.finish(&mut tests.reading.account);
+        (tests.broken_off, tests.not_evaluated) = (runs.broken_off, runs.not_evaluated);
         tests.circles = collected.circles.recordings();
-        tests.station_circles = collected.stationwise.circles();
+        let (circles, reasons) = collected.stationwise.circles();
+        tests.station_circles = circles;
         tests.paths = collected.paths.recordings();
         tests.linear = collected.linear.tests();
         tests.rotary_positioning = collected.angular.tests();
@@ -156,6 +168,7 @@ impl Tests {
         tests.drift.temperatures_left_out = temperatures_left_out(&tests.reading);
         tests.stops = collected.stops.stops();
         tests.left_out = left_out.unwrap_or_default();
+        tests.name_not_evaluated(runs.measured, &reasons);
         tests
     }
 
@@ -174,6 +187,12 @@ impl Tests {
             });
         }
     }
+}
+
+/// Whether a bag has readings of a grid encoder.
+fn has_grid(bag: &Bag) -> bool {
+    let mut read = bag.topics().iter().filter(|it| it.message_count > 0);
+    read.any(|it| it.topic.ends_with(topics::GRID_POSITION.name))
 }
 
 /// Readings of thermometers that are left out.
@@ -203,9 +222,8 @@ impl Collected {
             }
         } else if taken.is(&topics::TEST_SEGMENT) {
             let segment = taken.of(&topics::TEST_SEGMENT);
-            if let Some(segment) = segment.filter(|it| self.belonging.segment(it, taken)) {
-                self.test(segment);
-            }
+            let segment = segment.and_then(|it| self.belonging.segment(it, taken));
+            segment.into_iter().for_each(|it| self.test(it));
         } else if taken.is(&topics::GRID_POSITION) && is_under_way {
             let sample = taken.of(&topics::GRID_POSITION);
             if let Some(sample) = sample.filter(|it| self.belonging.grid(it, taken)) {
@@ -236,17 +254,20 @@ impl Collected {
     }
 
     /// An axis state; one that the machine of the machine file cannot be in is left out and counted.
-    fn state(&self, taken: &mut Taken<'_>) -> Option<AxisState> {
+    fn state(&mut self, taken: &mut Taken<'_>) -> Option<AxisState> {
         let state = taken.of(&topics::AXES_STATE)?;
         let machine = self.tests.machine.as_ref();
-        let Some(why) = machine.and_then(|machine| outside_travel(machine, &state)) else {
+        let Some((reason, why)) = self.strays.why_not(machine, &state) else {
             return Some(state);
         };
-        taken.leave_out(Reason::OtherMachine, || why.to_string());
+        taken.leave_out(reason, || why);
         None
     }
 
     fn test(&mut self, segment: TestSegment) {
+        if segment.begin {
+            self.strays.begin();
+        }
         self.tests.conditions.segment(&segment);
         self.circles.segment(&segment);
         self.paths.segment(&segment);

@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use abbe_msgs::{Defect, Message, Wire, WireError, from_cdr, topics};
 use metrology::Axis;
+use metrology::epoch::utc_of_nanos;
 use metrology::sample::{
-    AxisCompensation, BlockMeasurement, GeometryModel, PlanStatus, ProbeLatency, ProbedPoint,
-    TestKind, TestSegment, ThermalModel,
+    AxisCompensation, BlockMeasurement, GeometryModel, PlanStatus, ProbeLatency, ProbeTrigger,
+    ProbedPoint, TestKind, TestSegment, ThermalModel,
 };
 use metrology::stamp::{Host, Stamp};
 use nalgebra::Vector3;
@@ -111,8 +112,12 @@ pub struct Evidence {
     pub start_up: StartUp,
     /// Verifications with the plant's truth.
     pub verifications: Vec<Verification>,
-    /// The plant's latency, s.
+    /// Touches of latency runs as the control latched them, each with the run it belongs to.
+    pub latched: Vec<(u32, ProbeTrigger)>,
+    /// The latency that the simulated probe has, s.
     pub true_latency_s: Option<f64>,
+    /// Where the true latency is stated, where that is not the plant.
+    pub true_latency_source: Option<String>,
     /// Messages that could not be used, by topic and reason.
     pub undecoded: BTreeMap<(String, Defect), Undecoded>,
 }
@@ -134,6 +139,7 @@ impl Evidence {
         [
             topics::LATENCY.name,
             topics::PROBE_POINT.name,
+            topics::PROBE_TRIGGER.name,
             topics::BLOCKS_MEASUREMENT.name,
             topics::THERMAL_MODEL.name,
             topics::GEOMETRY_ROTARY.name,
@@ -156,6 +162,13 @@ impl Evidence {
                 self.start_up.work();
             }
             self.points.extend(taken.map(|point| (run, point)));
+        } else if topic == topics::PROBE_TRIGGER.name {
+            let run = self.current_run();
+            let is_of_latency = |segment: &TestSegment| segment.kind == TestKind::Latency;
+            if self.segments.last().is_some_and(is_of_latency) {
+                let taken = self.decode(&topics::PROBE_TRIGGER, (at, bytes));
+                self.latched.extend(taken.map(|touch| (run, touch)));
+            }
         } else if topic == topics::BLOCKS_MEASUREMENT.name {
             let taken = self.decode(&topics::BLOCKS_MEASUREMENT, (at, bytes));
             self.blocks.extend(taken);
@@ -303,10 +316,11 @@ impl Evidence {
     /// A sentence for each topic and reason of messages that could not be used.
     pub fn not_used(&self) -> impl Iterator<Item = String> {
         self.undecoded.iter().map(|((topic, defect), it)| {
-            let (n, first_s, what) = (it.messages, it.first.as_secs_f64(), &it.what);
+            let (n, what) = (it.messages, &it.what);
+            let first = utc_of_nanos(it.first.nanos(), 3);
             let reason = defect.words();
             format!(
-                "{topic}: {n} messages could not be used, {reason}: {what} (the first came at {first_s:.3} s)"
+                "{topic}: {n} messages could not be used, {reason}: {what} (the first came at {first})"
             )
         })
     }
@@ -326,6 +340,18 @@ impl Evidence {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_message_that_cannot_be_used_came_at_a_date() {
+        let mut evidence = Evidence::default();
+        let at = Stamp::from_nanos(1_700_003_585_250_000_000);
+        evidence.message(topics::LATENCY.name, at, &[0, 1]);
+        let line: String = evidence.not_used().collect();
+        assert!(
+            line.ends_with("(the first came at 2023-11-14 23:13:05.250 UTC)"),
+            "{line}"
+        );
+    }
 
     #[test]
     fn what_a_program_waits_for_is_named_until_it_goes_on() {

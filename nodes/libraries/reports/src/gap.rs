@@ -488,7 +488,7 @@ fn held_out(diagnosed: &Diagnosed) -> Section {
             three(run.floor_um),
         ]
     });
-    let names = ["run", "before µm", "after µm", "floor µm"];
+    let names = ["run", "before / µm", "after / µm", "floor / µm"];
     let mut section = section(
         HELD_OUT,
         &names,
@@ -513,8 +513,8 @@ fn held_out(diagnosed: &Diagnosed) -> Section {
         section.tables.push(Rows {
             head: head(&[
                 "effect",
-                "rms without it µm",
-                "rms with it alone µm",
+                "rms without it / µm",
+                "rms with it alone / µm",
                 "its share",
             ]),
             rows: without,

@@ -41,14 +41,14 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
         model.n_samples,
         um(model.residual_standard_deviation_mm)
     ));
-    section.answer(count(&all, known.len()));
+    section.answer(count(&all, &known));
     section
         .lines
         .extend(signs(model.curves.iter().map(|curve| curve.component)));
     section.tables.push(Rows {
         head: head(&["coefficient", "at the end of the span", "± U (k = 2)", "span"]),
         rows: known.iter().map(|coefficient| coefficient.row()).collect(),
-        note: "A coefficient times the greatest recorded distance from its origin to its power: µm for shifts, µrad for turns. U: expanded uncertainty as the residuals show it, those that follow each other counted as fewer, with what errors of the plate and heat between recordings leave open. How long and how square the plate is as a whole no recording can tell: that is in U where grid_encoder was given the plate's certificate (plate_scale_um_per_m, plate_squareness_urad).".to_owned(),
+        note: "A coefficient times the greatest recorded distance from its origin to its power: µm for shifts, µrad for turns; ~: U exceeds it. U: expanded uncertainty as the residuals show it, those that follow each other counted as fewer, with what errors of the plate and heat between recordings leave open. How long and how square the plate is as a whole no recording can tell: that is in U where grid_encoder was given the plate's certificate (plate_scale_um_per_m, plate_squareness_urad).".to_owned(),
     });
     let (short, long): (Vec<_>, Vec<_>) = model
         .combinations
@@ -67,7 +67,7 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
     }
     section.figures = figures(title, model, &all);
     section.tile = largest(&known).map(|(value, more)| {
-        let more = format!("{more}; {}", count(&all, known.len()).trim_end_matches('.'));
+        let more = format!("{more}; {}", count(&all, &known).trim_end_matches('.'));
         Tile::new("largest known geometric error", value, more)
     });
     match curves::drawings(model) {
@@ -79,28 +79,32 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
     section
 }
 
-/// The largest known shift, or turn where no shift is known, at the end of its span, with U; and where.
+/// The largest known shift, or turn where no shift is known, at the end of its span, with U; and what it is. None is smaller
+/// than its U.
 fn largest(known: &[&Coefficient]) -> Option<(String, String)> {
     let of = |is_angular: bool| {
         let own = { known.iter() }.filter(move |c| c.curve.component.is_angular() == is_angular);
-        own.filter(|c| c.at_end().is_finite())
+        own.filter(|c| c.at_end().is_finite() && !c.is_below_u())
             .max_by(|a, b| a.at_end().abs().total_cmp(&b.at_end().abs()))
     };
     let largest = of(false).or_else(|| of(true))?;
-    let row = largest.row();
-    let [name, value, u, span] = row.as_slice() else {
-        return None;
-    };
-    let (number, unit) = value.split_once(' ')?;
-    let name_alone = name.split(' ').next().unwrap_or(name);
-    let place = match name.split_once(" at ") {
-        Some((_, at)) => format!("at {at} {}", largest.unit_of_place()),
-        None => format!("at the end of {span}"),
-    };
+    let (value, u) = largest.at_end_with_u();
+    let component = largest.curve.component;
     Some((
-        format!("{name_alone} {number} ± {u} {unit}"),
-        format!("{place}, k = 2"),
+        format!("{component} {value} ± {u} {}", unit(component)),
+        format!("{}; k = 2", largest.in_words()),
     ))
+}
+
+/// A part of a polynomial by its power.
+fn of_degree(power: u8) -> String {
+    match power {
+        0 => "constant part".to_owned(),
+        1 => "linear part".to_owned(),
+        2 => "quadratic part".to_owned(),
+        3 => "cubic part".to_owned(),
+        n => format!("part of degree {n}"),
+    }
 }
 
 /// A sentence for the sign of each squareness among components; none without one.
@@ -114,14 +118,19 @@ pub fn signs(components: impl Iterator<Item = ErrorComponent>) -> Option<String>
     (!words.is_empty()).then(|| words.join(" "))
 }
 
-fn count(all: &[Coefficient], n_known: usize) -> String {
+fn count(all: &[Coefficient], known: &[&Coefficient]) -> String {
+    let n_known = known.len();
+    let below = match known.iter().filter(|c| c.is_below_u()).count() {
+        0 => String::new(),
+        n => format!(" ({n} with a U above the value, marked ~)"),
+    };
     let unknown: Vec<String> = all
         .iter()
         .filter(|c| !c.is_known())
         .map(Coefficient::name)
         .collect();
     if unknown.is_empty() {
-        return format!("All {n_known} coefficients are known by themselves.");
+        return format!("All {n_known} coefficients are known by themselves{below}.");
     }
     let names = if unknown.len() <= FEW {
         format!(": {}", unknown.join(", "))
@@ -129,7 +138,7 @@ fn count(all: &[Coefficient], n_known: usize) -> String {
         String::new()
     };
     format!(
-        "{n_known} of {} coefficients are known by themselves; {} are not{names}.",
+        "{n_known} of {} coefficients are known by themselves{below}; {} are not{names}.",
         all.len(),
         unknown.len()
     )
@@ -305,6 +314,12 @@ impl Coefficient<'_> {
         vec![self.name(), format!("{u} {}", unit(component)), self.span()]
     }
 
+    /// Whether its value is smaller than its U.
+    fn is_below_u(&self) -> bool {
+        let u = COVERAGE * self.times_reach(&self.curve.standard_uncertainty);
+        u > self.at_end().abs()
+    }
+
     fn span(&self) -> String {
         let (least, greatest) = self.curve.span;
         let axis = self.curve.component.of;
@@ -357,21 +372,44 @@ impl Coefficient<'_> {
         values.get(self.place).copied().unwrap_or(f64::NAN) * factor
     }
 
-    fn unit_of_place(&self) -> &'static str {
-        if self.curve.component.of.is_linear() {
-            "mm"
-        } else {
-            "rad"
+    /// What it is, and where: `cubic part (coefficient ECY3) of the rotation of Y about Z, at the end of Y 0 to 300 mm`.
+    fn in_words(&self) -> String {
+        let component = self.curve.component;
+        let (what, axis) = (component.in_words(), component.of);
+        match self.curve.form {
+            CurveForm::Constant => what,
+            CurveForm::Polynomial => format!(
+                "{} (coefficient {}) of the {what}, at the end of {}",
+                of_degree(self.power()),
+                self.name(),
+                self.span()
+            ),
+            CurveForm::Table => {
+                let at = self.curve.position.get(self.place);
+                let at = at.copied().unwrap_or(f64::NAN);
+                let at = if axis.is_linear() {
+                    format!("{at:.1} mm")
+                } else {
+                    format!("{:.1}°", at.to_degrees())
+                };
+                format!("{what}, at {axis} = {at}")
+            }
         }
+    }
+
+    /// Value at the end of the span and its U, µm or µrad.
+    fn at_end_with_u(&self) -> (String, String) {
+        let u = COVERAGE * self.times_reach(&self.curve.standard_uncertainty);
+        rounded(self.at_end(), u)
     }
 
     fn row(&self) -> Vec<String> {
         let component = self.curve.component;
-        let u = COVERAGE * self.times_reach(&self.curve.standard_uncertainty);
-        let (value, u) = rounded(self.at_end(), u);
+        let (value, u) = self.at_end_with_u();
+        let mark = if self.is_below_u() { " ~" } else { "" };
         vec![
             self.name(),
-            format!("{value} {}", unit(component)),
+            format!("{value} {}{mark}", unit(component)),
             u,
             self.span(),
         ]
@@ -438,4 +476,54 @@ pub fn tables(tables: &[PositioningTable]) -> Option<Section> {
         });
     }
     Some(section)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve(name: &str, form: CurveForm) -> ErrorCurve {
+        ErrorCurve {
+            component: name.parse().unwrap(),
+            form,
+            origin: 0.0,
+            power: vec![3],
+            position: vec![-126.0],
+            coefficient: vec![1e-12],
+            standard_uncertainty: vec![1e-14],
+            estimable: vec![true],
+            span: (0.0, 300.0),
+        }
+    }
+
+    #[test]
+    fn the_largest_coefficient_is_named_by_its_part_its_error_and_its_place() {
+        for (name, form, wanted) in [
+            (
+                "ECY",
+                CurveForm::Polynomial,
+                "cubic part (coefficient ECY3) of the rotation of Y about Z, at the end of Y 0 to 300 mm; k = 2",
+            ),
+            ("EC0Y", CurveForm::Constant, "squareness of Y to X; k = 2"),
+            (
+                "EXY",
+                CurveForm::Table,
+                "straightness of Y along X, at Y = -126.0 mm; k = 2",
+            ),
+        ] {
+            let curve = curve(name, form);
+            let known = Coefficient {
+                curve: &curve,
+                place: 0,
+            };
+            assert_eq!(largest(&[&known]).unwrap().1, wanted);
+        }
+        let curve = curve("ECY", CurveForm::Polynomial);
+        let known = Coefficient {
+            curve: &curve,
+            place: 0,
+        };
+        // By hand: 1e-12 rad/mm^3 * (300 mm)^3 = 27 µrad, twice 0.27 µrad.
+        assert_eq!(largest(&[&known]).unwrap().0, "ECY 27.00 ± 0.54 µrad");
+    }
 }

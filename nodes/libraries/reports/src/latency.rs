@@ -1,13 +1,18 @@
 //! Latency: headline, table and plot of touches over feed.
 
+use std::collections::BTreeMap;
+
 use anyhow::Result;
 use maud::{Markup, html};
-use metrology::sample::{LatencyMethod, ProbeLatency, ProbedPoint, Rejection, TestKind};
+use metrology::Axis;
+use metrology::sample::{
+    FacePosition, LatencyMethod, ProbeLatency, ProbedPoint, Rejection, TestKind,
+};
 
 use super::page::{figure, fold, table};
 use super::plot::{Plot, Trace, svg};
 use super::screen::{Screen, Tile, Tone};
-use super::section::rounded;
+use super::section::{rounded, um};
 use super::svg::short;
 use super::{Report, conditions};
 use crate::evidence::Evidence;
@@ -59,7 +64,7 @@ pub fn headline(evidence: &Evidence) -> Vec<String> {
         Some(truth_s) => {
             let off_s = latency.latency_s - truth_s;
             line.push_str(&format!(
-                "; the plant's is {} ms: {} ms or {:.1} standard uncertainties away.",
+                "; the true one of the simulation is {} ms: {} ms or {:.1} standard uncertainties away.",
                 ms(truth_s),
                 ms(off_s),
                 off_s.abs() / latency.standard_uncertainty_s
@@ -138,6 +143,33 @@ pub fn section(evidence: &Evidence) -> Result<Markup> {
     })
 }
 
+/// Touches as the control latched them over feed: (mm/min, µm), counted from where the estimated latency puts their surface.
+/// A touch that was rejected for another reason than an unknown latency is left out.
+fn latched(evidence: &Evidence, latency_s: f64) -> Vec<(f64, f64)> {
+    let is_usable = |sequence: u32| {
+        let mut points = evidence.points.iter().map(|(_, point)| point);
+        points.any(|point| {
+            let is_sound = [Rejection::None, Rejection::NoLatency].contains(&point.rejection);
+            point.sequence == sequence && is_sound
+        })
+    };
+    let mut surfaces: BTreeMap<(u32, &str), Vec<(f64, f64)>> = BTreeMap::new();
+    let usable = evidence.latched.iter();
+    for (run, touch) in usable.filter(|(_, touch)| is_usable(touch.sequence)) {
+        let along_mm = touch.latched.xyz().dot(&touch.approach);
+        let key = (*run, touch.feature_id.as_str());
+        let of_surface = surfaces.entry(key).or_default();
+        of_surface.push((touch.feed_mm_s, along_mm));
+    }
+    let from_surface = |touches: Vec<(f64, f64)>| {
+        let surfaces_mm = touches.iter().map(|(feed, along)| along - feed * latency_s);
+        let surface_mm = surfaces_mm.sum::<f64>() / touches.len() as f64;
+        let shown = move |(feed, along): (f64, f64)| (feed * 60.0, (along - surface_mm) * 1e3);
+        touches.into_iter().map(shown)
+    };
+    surfaces.into_values().flat_map(from_surface).collect()
+}
+
 /// Corrected touches over feed, from their mean: (mm/min, µm). A touch that was rejected has no place.
 fn corrected(evidence: &Evidence) -> Vec<(f64, f64)> {
     let used: Vec<(f64, f64)> = { touches(evidence).into_iter() }
@@ -149,25 +181,44 @@ fn corrected(evidence: &Evidence) -> Vec<(f64, f64)> {
     used.into_iter().map(from_mean).collect()
 }
 
-/// Touches over feed; `None` where none was corrected.
+/// Touches over feed, as latched and corrected; `None` where there is none of either.
 ///
 /// # Errors
 /// When the plot cannot be drawn.
 fn picture(evidence: &Evidence) -> Result<Option<Markup>> {
-    let points = corrected(evidence);
-    if points.is_empty() {
+    let latency_s = { evidence.latencies.last() }.map_or(f64::NAN, |latency| latency.latency_s);
+    let latched = latched(evidence, latency_s);
+    let fastest = latched.iter().map(|touch| touch.0).fold(0.0, f64::max);
+    let estimate = [0.0, fastest].map(|feed| (feed, feed / 60.0 * latency_s * 1e3));
+    let trace = |name: String, points: Vec<(f64, f64)>, marks| Trace {
+        name,
+        points,
+        marks,
+    };
+    let mut traces = vec![
+        trace("touch as latched".to_owned(), latched, true),
+        trace(
+            format!("estimate, {} ms", ms(latency_s)),
+            estimate.to_vec(),
+            false,
+        ),
+    ];
+    if fastest == 0.0 || !latency_s.is_finite() {
+        traces.clear();
+    }
+    let corrected = corrected(evidence);
+    if !corrected.is_empty() {
+        traces.push(trace("touch, corrected".to_owned(), corrected, true));
+    }
+    if traces.is_empty() {
         return Ok(None);
     }
     let plot = Plot {
         x: "feed at contact / mm/min".to_owned(),
-        y: "corrected surface, from the mean / µm".to_owned(),
-        traces: vec![Trace {
-            name: "touch".to_owned(),
-            points,
-            marks: true,
-        }],
+        y: "touch beyond the surface / µm".to_owned(),
+        traces,
     };
-    let caption = "Touches of the latency run after correction, along the approach: a slope that is left would be latency that was not taken out";
+    let caption = "Touches of the latency runs along the approach. The slope of those as latched is the latency; corrected touches are counted from their mean, and a slope of theirs would be latency that was not taken out.";
     Ok(Some(figure(&svg(&plot)?, caption)))
 }
 
@@ -206,7 +257,7 @@ pub fn screen(evidence: &Evidence) -> Result<Screen> {
             let off = (latency.latency_s - truth_s).abs() / latency.standard_uncertainty_s;
             let tone = if off <= AGREES { Tone::Good } else { Tone::Bad };
             let sentence = format!(
-                "Probe latency {value} (k = 2); the plant's is {} ms, {} standard uncertainties away.",
+                "Probe latency {value} (k = 2); the true one of the simulation is {} ms, {} standard uncertainties away.",
                 ms(truth_s),
                 short(off)
             );
@@ -214,12 +265,53 @@ pub fn screen(evidence: &Evidence) -> Result<Screen> {
         }
         None => (format!("Probe latency {value} (k = 2)."), Tone::Plain),
     };
+    let tiles = [
+        Some(Tile::new("probe latency", value, more)),
+        truth(evidence),
+        cold(evidence),
+    ];
     Ok(Screen {
         verdict: Some((sentence, tone)),
-        tiles: vec![Tile::new("probe latency", value, more)],
+        tiles: tiles.into_iter().flatten().collect(),
         picture: picture(evidence)?,
         ..Screen::default()
     })
+}
+
+/// The true latency, where a simulation states one.
+fn truth(evidence: &Evidence) -> Option<Tile> {
+    let truth_s = evidence.true_latency_s?;
+    let source = evidence.true_latency_source.as_deref();
+    let more = source.unwrap_or("as the simulated machine has it; no node knows it");
+    Some(Tile::new(
+        "true latency",
+        format!("{} ms", ms(truth_s)),
+        more,
+    ))
+}
+
+/// The faces of blocks that were measured cold, and the greatest of their uncertainties.
+fn cold(evidence: &Evidence) -> Option<Tile> {
+    let cold = || evidence.blocks.iter().filter(|block| block.cold);
+    let faces = cold().flat_map(|block| {
+        let of_axis = |axis| Some((block.block_id.as_str(), axis, block.faces[axis]?));
+        Axis::LINEAR.into_iter().filter_map(of_axis)
+    });
+    let faces: Vec<_> = faces.collect();
+    let u = |(_, _, face): &&(&str, Axis, FacePosition)| face.standard_uncertainty_mm;
+    let worst = faces.iter().max_by(|a, b| u(a).total_cmp(&u(b)))?;
+    let more = format!(
+        "measured cold, in {} cycles; U up to {} µm (k = 2), at {} in {}",
+        cold().count(),
+        um(COVERAGE * worst.2.standard_uncertainty_mm),
+        worst.0,
+        worst.1
+    );
+    let faces = match faces.len() {
+        1 => "1 face".to_owned(),
+        n => format!("{n} faces"),
+    };
+    Some(Tile::new("reference blocks", faces, more))
 }
 
 /// The way at a feed during the latency with its U, µm.
@@ -239,9 +331,9 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
         lines.push(TICKS_SHARE.to_owned());
     }
     let body = html! {
-        @for line in &lines { p { (line) } }
         (super::feeds::section(evidence))
         (section(evidence)?)
+        @if !evidence.latencies.is_empty() { p.note { (TICKS_SHARE) } }
         (super::blocks::section(evidence))
     };
     let mut screen = screen(evidence)?;
@@ -260,7 +352,7 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
 mod tests {
     use super::*;
     use crate::evidence::Evidence;
-    use metrology::sample::{Correction, TestSegment};
+    use metrology::sample::{Correction, ProbeTrigger, TestSegment};
     use metrology::stamp::Stamp;
     use metrology::{AxisSet, PerAxis};
     use nalgebra::Vector3;
@@ -306,8 +398,94 @@ mod tests {
             (found[0].1 + 2.0).abs() < 1e-6 && (found[1].1 - 2.0).abs() < 1e-6,
             "{found:?}"
         );
+        assert!(latched(&evidence, 0.004).is_empty());
         let svg = picture(&evidence).unwrap().unwrap().into_string();
         assert_eq!(svg.matches("<circle").count(), 2, "{svg}");
         assert!(!svg.contains("NaN"));
+    }
+
+    /// A touch of a surface at 10 mm whose latch is late by 4 ms.
+    fn latched_at(feed_mm_s: f64, sequence: u32) -> (u32, ProbeTrigger) {
+        let mut latched = PerAxis::default();
+        latched[Axis::X] = 10.0 + 0.004 * feed_mm_s;
+        let touch = ProbeTrigger {
+            received_at: Stamp::default(),
+            controller_at: Stamp::default(),
+            feature_id: "block".to_owned(),
+            approach: Vector3::x(),
+            feed_mm_s,
+            axes: AxisSet::XYZ,
+            latched,
+            sequence,
+        };
+        (1, touch)
+    }
+
+    #[test]
+    fn touches_that_no_latency_was_known_for_show_its_slope() {
+        let (run, unknown) = touch(f64::NAN, Rejection::NoLatency);
+        let bounced = ProbedPoint {
+            sequence: 3,
+            rejection: Rejection::StandoffTooShort,
+            ..unknown.clone()
+        };
+        let second = ProbedPoint {
+            sequence: 2,
+            ..unknown.clone()
+        };
+        let evidence = Evidence {
+            points: vec![(run, unknown), (run, second), (run, bounced)],
+            latched: vec![latched_at(2.0, 1), latched_at(20.0, 2), latched_at(9.0, 3)],
+            ..Evidence::default()
+        };
+        let found = latched(&evidence, 0.004);
+        assert_eq!(found.len(), 2);
+        // 4 ms at 2 and 20 mm/s are 8 and 80 µm.
+        for ((feed, um), wanted) in found.iter().zip([(120.0, 8.0), (1200.0, 80.0)]) {
+            assert!((feed - wanted.0).abs() < 1e-9 && (um - wanted.1).abs() < 1e-6);
+        }
+    }
+
+    fn estimate() -> ProbeLatency {
+        ProbeLatency {
+            at: Stamp::default(),
+            method: LatencyMethod::WeightedLeastSquares,
+            latency_s: 0.004_51,
+            standard_uncertainty_s: 0.000_02,
+            two_feed_latency_s: 0.004_5,
+            least_squares_latency_s: 0.004_51,
+            feeds_mm_s: vec![2.0, 20.0],
+            n: 2,
+            intercept_mm: 10.0,
+            intercept_uncertainty_mm: 1e-4,
+            lack_of_fit_p: 0.5,
+            negative: false,
+        }
+    }
+
+    #[test]
+    fn a_true_latency_that_a_simulation_states_stands_on_the_first_screen() {
+        let evidence = Evidence {
+            latencies: vec![estimate()],
+            true_latency_s: Some(0.004_5),
+            true_latency_source: Some("probe-latency.on-delay = 4.200 ms".to_owned()),
+            ..Evidence::default()
+        };
+        let screen = screen(&evidence).unwrap();
+        let (verdict, tone) = screen.verdict.clone().unwrap();
+        assert!(
+            verdict.ends_with(
+                "the true one of the simulation is 4.500 ms, 0.500 standard uncertainties away."
+            ),
+            "{verdict}"
+        );
+        assert_eq!(tone, Tone::Good);
+        assert_eq!(screen.tiles[1].value, "4.500 ms");
+        assert_eq!(screen.tiles[1].more, "probe-latency.on-delay = 4.200 ms");
+        let unknown = Evidence {
+            latencies: vec![estimate()],
+            ..Evidence::default()
+        };
+        assert_eq!(super::screen(&unknown).unwrap().tiles.len(), 1);
     }
 }

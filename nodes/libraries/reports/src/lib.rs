@@ -8,6 +8,7 @@ use maud::Markup;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use minus::with_minus_signs;
 use screen::{Made, Screen, Tone};
 use terminal::{Part, Room};
 
@@ -29,6 +30,7 @@ pub mod lines;
 pub mod loss;
 pub mod machine_defaults;
 pub mod machine_of_bag;
+mod minus;
 mod over_time;
 pub mod page;
 pub mod paths;
@@ -146,7 +148,8 @@ impl Report {
 
     /// All of the report as it stands on a terminal.
     pub fn terminal(&self) -> String {
-        format!("{}{}", self.head(), terminal::whole(&self.parts))
+        let text = format!("{}{}", self.head(), terminal::whole(&self.parts));
+        with_minus_signs(&text).into_owned()
     }
 
     /// The report in a few lines: the answer, and the tables that matter.
@@ -168,11 +171,31 @@ impl Report {
         self.figures[key] = section.figures.clone();
     }
 
+    /// This report with tests of its bag behind it, but for details; without a budget nothing of them has an uncertainty.
+    pub fn add_tests(&mut self, sections: &[section::Section], is_budget_stated: bool) {
+        let shown = sections
+            .iter()
+            .filter(|one| one.rank < terminal::Rank::Detail);
+        let shown: Vec<&section::Section> = shown.collect();
+        for section in &shown {
+            self.parts.push(Part::plain("\n"));
+            self.parts.push(Part::of(section));
+        }
+        self.body = maud::html! { (self.body) @for section in &shown { (section.html()) } };
+        let mut figures: Vec<serde_json::Value> =
+            shown.iter().map(|one| one.figures.clone()).collect();
+        if !is_budget_stated {
+            figures.iter_mut().for_each(evaluate::budget::unstate);
+        }
+        self.figures["tests"] = figures.into();
+    }
+
     /// This report with the conditions of its tests behind it.
     pub fn add_conditions(&mut self, conditions: &test_conditions::Conditions) {
         let text = format!("\n{}", conditions.terminal());
         self.parts.push(Part::plain(text));
         self.screen.behind.push(conditions.section.html());
+        self.screen.conditions.clone_from(&conditions.facts);
         self.figures["conditions"] = conditions.section.figures.clone();
     }
 

@@ -3,6 +3,8 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use metrology::visible::visible;
 
+use super::minus::page_with_minus_signs;
+
 const STYLE: &str = "
 :root { color-scheme: light dark; --ink: #1b1f24; --paper: #ffffff; --rule: #d0d7de; --soft: #57606a; --good: #116329; --bad: #a40e26; --c0: #0072b2; --c1: #d55e00; --c2: #009e73; --c3: #cc79a7; --c4: #4aa3d8; --c5: #b07a00; }
 @media (prefers-color-scheme: dark) { :root { --ink: #e6edf3; --paper: #0d1117; --rule: #30363d; --soft: #9198a1; --good: #56d364; --bad: #ff7b72; --c0: #56b4e9; --c1: #f0873a; --c2: #2dc497; --c3: #e3a1c6; --c4: #9bd3f5; --c5: #e6b94f; } }
@@ -13,7 +15,7 @@ th, td { padding: .25rem .8rem .25rem 0; border-bottom: 1px solid var(--rule); t
 th:first-child, td:first-child { text-align: left; } th { color: var(--soft); font-weight: 600; white-space: normal; }
 th.prose, td.prose { text-align: left; white-space: normal; min-width: 10rem; }
 .plot { width: 100%; height: auto; fill: currentColor; overflow: visible; } .polar { max-width: 34rem; display: block; } .plot text { font: 15px system-ui, sans-serif; stroke: none; } .plot .ring { font-size: 13px; paint-order: stroke; stroke: var(--paper); stroke-width: 4px; }
-.three .plot text { font-size: 13px; } .bars .ring { font-size: 15px; stroke: none; } .plot .halo { paint-order: stroke; stroke: var(--paper); stroke-width: 4px; } .note { color: var(--soft); font-size: .9rem; } .good { color: var(--good); } .bad { color: var(--bad); }
+.three .plot text { font-size: 13px; } .bars .ring { font-size: 15px; stroke: none; } .note { color: var(--soft); font-size: .9rem; } .good { color: var(--good); } .bad { color: var(--bad); }
 .c0 { color: var(--c0); } .c1 { color: var(--c1); } .c2 { color: var(--c2); } .c3 { color: var(--c3); } .c4 { color: var(--c4); } .c5 { color: var(--c5); }
 .three { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 16rem), 1fr)); gap: 0 .8rem; } .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 24rem), 1fr)); gap: 0 1.2rem; align-items: start; } .bars { max-width: 36rem; display: block; }
 figure { margin: .8rem 0; break-inside: avoid; } .legend { display: flex; flex-wrap: wrap; gap: 0 1rem; font-size: .9rem; } .legend .of { font-weight: 600; }
@@ -45,7 +47,7 @@ pub fn page(title: &str, body: &Markup) -> String {
     }
     .into_string();
     // Marks of direction and control characters of names and texts from outside would show another page.
-    visible(&page).into_owned()
+    page_with_minus_signs(&visible(&page))
 }
 
 /// Characters beyond which a cell is a sentence.

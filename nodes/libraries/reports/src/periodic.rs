@@ -49,18 +49,16 @@ pub fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section> {
         test.kind == TestKind::Positioning && test.axis.is_some() && has_targets
     });
     let mut section = Section::new("Periodic positioning error, ISO 230-2");
-    let mut found = vec![];
+    let (mut found, mut refused) = (vec![], vec![]);
     for test in of_axes {
         match evaluated(test, tests, budget) {
             Ok(mut both) => found.append(&mut both),
-            Err(why) => section.warn(
-                NOT_EVALUATED,
-                format!(
-                    "{}, run {} on: not evaluated: {why}.",
-                    test.name, test.first_run
-                ),
-            ),
+            Err(why) => refused.push((format!("{}, run {} on", test.name, test.first_run), why)),
         }
+    }
+    // One remark, however many tests there are.
+    if !refused.is_empty() {
+        section.warn(NOT_EVALUATED, refused_in_words(&refused));
     }
     if found.is_empty() && section.lines.is_empty() {
         return None;
@@ -79,7 +77,7 @@ pub fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section> {
             ]),
             rows: found.iter().map(Found::row).collect(),
             note: format!(
-                "P: greatest minus least value of what repeats with the lead, a straight line taken out; its shape is that of the harmonics whose amplitudes are told, sharper ones are not in it. A probability p above {SIGNIFICANT} says that scatter alone shows as much.{}",
+                "P: greatest minus least value of what repeats with the lead, a straight line taken out; its shape is that of the harmonics whose amplitudes stand in the table; sharper ones are not in it. A probability p above {SIGNIFICANT} says that scatter alone shows as much.{}",
                 if stated { " ± expanded uncertainty, k = 2, of the fit and of drift." } else { "" }
             ),
         });
@@ -90,6 +88,21 @@ pub fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section> {
     let all: Vec<Value> = found.iter().map(Found::as_json).collect();
     section.figures = json!({ "test": section.title, "iso230_2_periodic": all });
     Some(section)
+}
+
+/// Which tests were not evaluated: each reason once, with the tests that it is of.
+fn refused_in_words(refused: &[(String, String)]) -> String {
+    let mut by_reason: Vec<(&str, Vec<&str>)> = vec![];
+    for (test, why) in refused {
+        match by_reason.iter_mut().find(|(known, _)| known == why) {
+            Some((_, tests)) => tests.push(test),
+            None => by_reason.push((why, vec![test])),
+        }
+    }
+    let sentence =
+        |(why, tests): &(&str, Vec<&str>)| format!("{}: not evaluated: {why}.", tests.join("; "));
+    let all: Vec<String> = by_reason.iter().map(sentence).collect();
+    all.join(" ")
 }
 
 fn evaluated(
@@ -273,6 +286,8 @@ mod tests {
                 place_mm: None,
                 targets_mm: targets_mm.clone(),
                 up_mm: vec![run.clone(); 5],
+                mean_mm: 0.0,
+                outlying: Default::default(),
                 down_mm: vec![run.clone(); 5],
                 left_out: vec![],
                 compensated: false,
@@ -299,6 +314,48 @@ mod tests {
             let row = &section.tables[0].rows[0];
             assert_eq!(row[0].contains(BY_OWN_SCALE), is_own, "{row:?}");
         }
+    }
+
+    #[test]
+    fn tests_that_are_not_evaluated_are_one_remark_with_each_reason_once() {
+        let refused = [
+            ("X, run 3 on", "15 mm"),
+            ("X, run 15 on", "20 mm"),
+            ("X, run 46 on", "20 mm"),
+        ];
+        let refused =
+            refused.map(|(test, why)| (test.to_owned(), format!("targets lie {why} apart")));
+        assert_eq!(
+            refused_in_words(&refused),
+            "X, run 3 on: not evaluated: targets lie 15 mm apart. X, run 15 on; X, run 46 on: not evaluated: targets lie 20 mm apart."
+        );
+        let machine = include_str!("../../../../launch_configs/dual_loop/machine.yaml");
+        let wide = |run: u32| LinearTest {
+            kind: TestKind::Positioning,
+            axis: Some(Axis::X),
+            name: "X".to_owned(),
+            first_run: run,
+            runs: vec![run],
+            feed_mm_s: 100.0,
+            reference: Reference::Length,
+            direction: Vector3::x(),
+            place_mm: None,
+            targets_mm: (0..9).map(|k| 20.0 * f64::from(k)).collect(),
+            up_mm: vec![vec![0.0; 9]; 5],
+            down_mm: vec![vec![0.0; 9]; 5],
+            left_out: vec![],
+            mean_mm: 0.0,
+            outlying: Default::default(),
+            compensated: false,
+            longest_rest: None,
+        };
+        let tests = Tests {
+            linear: [3, 15, 46].map(wide).to_vec(),
+            machine: Some(MachineFile::parse(machine, "machine.yaml").unwrap()),
+            ..Tests::default()
+        };
+        let section = section(&tests, None).unwrap();
+        assert_eq!(section.warnings.len(), 1, "{:?}", section.lines);
     }
 
     #[test]

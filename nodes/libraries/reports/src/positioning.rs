@@ -8,8 +8,10 @@ use iso230::positioning::{PositioningRemark, PositioningResult, PositioningRuns}
 use iso230::{Direction, ExpandedLength, positioning};
 use machine::MachineFile;
 use metrology::Axis;
+use metrology::number::decimals_of;
 use metrology::sample::TestKind;
 
+mod change;
 mod curves;
 mod diagonals;
 mod single;
@@ -17,7 +19,10 @@ mod single;
 mod tests;
 mod uncertainty;
 
+pub use diagonals::shown_title;
+
 use super::section::{Rows, Section, head, um};
+use super::svg::unsigned_zero;
 use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, unstate, unstate_named};
 use crate::evaluate::correction::{About, BY_OWN_SCALE, Measured};
@@ -26,14 +31,17 @@ use crate::evaluate::linear::{LinearTest, Reference, STOP_SETTLE, level};
 /// A figure and, where a budget was given, its expanded uncertainty.
 pub fn figure(value: &ExpandedLength, stated: bool) -> String {
     if stated {
-        format!(
-            "{} ± {}",
-            um(value.value_mm),
-            um(value.expanded_uncertainty_mm)
-        )
+        with_u(value.value_mm * 1e3, value.expanded_uncertainty_mm * 1e3)
     } else {
         um(value.value_mm)
     }
+}
+
+/// A value and its expanded uncertainty with two decimals, or more where its second digit is behind them.
+pub(crate) fn with_u(value: f64, expanded: f64) -> String {
+    let decimals = decimals_of(expanded).max(2);
+    let value = unsigned_zero(format!("{value:.decimals$}"));
+    format!("{value} ± {expanded:.decimals$}")
 }
 
 /// One part for each test; a test that cannot be evaluated says why.
@@ -44,8 +52,7 @@ pub fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> 
     // What all four diagonals say together comes before each of them.
     let mut sections = diagonals::sections(tests, budget);
     for test in &tests.linear {
-        let measured = Measured::of(tests, budget, About::line(test));
-        sections.push(section(tests, test, &measured)?);
+        sections.push(section(tests, test, budget)?);
     }
     Ok(sections)
 }
@@ -88,10 +95,11 @@ fn periods_mm(test: &LinearTest, machine: Option<&MachineFile>) -> Vec<f64> {
     periods_mm
 }
 
-fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Section> {
+fn section(tests: &Tests, test: &LinearTest, budget: Option<&Budget>) -> Result<Section> {
+    let measured = &Measured::of(tests, budget, About::line(test));
     let what = match test.kind {
-        TestKind::Diagonal => "Diagonal",
-        _ => "Positioning",
+        TestKind::Diagonal => diagonals::DIAGONAL,
+        _ => "Positioning ",
     };
     let state = if test.compensated {
         "compensated"
@@ -103,10 +111,8 @@ fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Sect
         Reference::Length => "by the length reference",
         Reference::Scale => "by the linear scale",
     };
-    let mut section = Section::new(format!(
-        "{what} {}, run {} on: {state}, {by}",
-        test.name, test.first_run
-    ));
+    let title = |name: &str| format!("{what}{name}, run {} on: {state}, {by}", test.first_run);
+    let mut section = Section::new(title(&test.name));
     let runs = runs(test, periods_mm(test, tests.machine.as_ref()), measured);
     let found = match side_of(test) {
         _ if single_run::is_single(&runs) => single_run::evaluate(&runs, &measured.budget)
@@ -123,6 +129,8 @@ fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Sect
         Ok(filled) => {
             filled?;
             state_reference(&mut section, test, measured);
+            let r_mm = section.figures["iso230_2"]["repeatability"]["value_mm"].as_f64();
+            change::state(&mut section, (test, &runs), (tests, budget), r_mm);
         }
         Err(error) => {
             let why = too_short(test).or_else(|| without_places(tests, test));
@@ -132,6 +140,11 @@ fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Sect
         }
     }
     section.tell_left_out(&test.left_out);
+    // The figures keep the beam's own name, by which a history knows the test.
+    if test.kind == TestKind::Diagonal {
+        section.title = title(&diagonals::shown_name(test));
+    }
+    section.name_far(&test.outlying.far);
     Ok(section)
 }
 

@@ -73,6 +73,10 @@ fn comparison(
     let mut section = Section::new(title);
     let n = found.unknowns.len();
     let seen = found.unknowns.iter().filter(|c| is_seen(c)).count();
+    let imprecise = match found.unknowns.iter().filter(|c| is_below_u(c)).count() {
+        0 => String::new(),
+        k => format!(", {k} of them with a U above the value (~)"),
+    };
     section.lines.push(format!(
         "{} stations of {:.0} readings each give the published equations rank {} for {n} unknowns: their solution has {} arbitrary numbers, the source's vector U, here a (it is no uncertainty).",
         found.n_stations,
@@ -81,7 +85,7 @@ fn comparison(
         n - found.rank
     ));
     section.lines.push(format!(
-        "a = 0 and a = {:.0} µm draw one and the same trace ({:.0e} µm apart, {} µm rms from the readings) with different errors. Of the {n} the circle determines {seen}; the others, marked ×, are numbers of the method and not of the machine.",
+        "a = 0 and a = {:.0} µm draw one and the same trace ({:.0e} µm apart, {} µm rms from the readings) with different errors. Of the {n} the circle determines {seen}{imprecise}; the others, marked ×, are numbers of the method and not of the machine.",
         OTHER_MM * 1e3,
         found.apart_mm * 1e3,
         um(found.left_mm)
@@ -100,6 +104,7 @@ fn comparison(
         vec![
             compared.unknown.to_string(),
             format!("{}{}", um(compared.published_mm), mark(compared)),
+            expanded(compared),
             format!("{}{}", um(compared.other_mm), mark(compared)),
             of_fourteen(compared, 0),
             of_fourteen(compared, 1),
@@ -109,8 +114,9 @@ fn comparison(
     });
     section.tables.push(Rows {
         head: head(&[
-            "µm at the radius",
+            "coefficient × distance / µm",
             "published, a = 0",
+            "± U (k = 2)",
             "published, other a",
             "14 stations",
             "14 others",
@@ -118,7 +124,7 @@ fn comparison(
             "all recordings, ± U (k = 2)",
         ]),
         rows: rows.collect(),
-        note: "Each number is the error at the point of the circle that is farthest from the machine's origin along the axis (at the radius, where the circle is about the origin), a turn times that distance. The last column is what all recordings of the bag determine, at the height of the plate; a dash: not even they. A squareness is that of the tangents where both axes are at zero, a number of this model; that of ISO 230-1 between reference lines stands with the geometric errors.".to_owned(),
+        note: "Each number is a coefficient times the greatest distance of the circle from the machine's origin along the axis, to its power (the radius, where the circle is about the origin); a turn once more times that distance. It is the error at that distance on the positive side; on the negative side odd powers have the other sign. U of a published value: what is left of the trace, over the stations; ~: it exceeds the value. The last column is what all recordings of the bag determine, at the height of the plate; a dash: not even they. A squareness is that of the tangents where both axes are at zero, a number of this model; that of ISO 230-1 between reference lines stands with the geometric errors.".to_owned(),
     });
     section.figures = figures((run, &section.title), found, of_all);
     section
@@ -148,12 +154,31 @@ fn is_seen(compared: &Compared) -> bool {
     compared.visibility == Visibility::Estimable
 }
 
+/// Whether the circle determines a value that is smaller than its own U.
+fn is_below_u(compared: &Compared) -> bool {
+    let u_mm = COVERAGE * compared.standard_uncertainty_mm;
+    is_seen(compared) && u_mm > compared.published_mm.abs()
+}
+
 fn mark(compared: &Compared) -> &'static str {
-    if is_seen(compared) { "  " } else { " ×" }
+    match (is_seen(compared), is_below_u(compared)) {
+        (false, _) => " ×",
+        (true, true) => " ~",
+        (true, false) => "  ",
+    }
+}
+
+/// U of a published value that the circle determines.
+fn expanded(compared: &Compared) -> String {
+    if !is_seen(compared) {
+        return "—".to_owned();
+    }
+    um(COVERAGE * compared.standard_uncertainty_mm)
 }
 
 fn verdict(compared: &Compared) -> &'static str {
     match compared.visibility {
+        Visibility::Estimable if is_below_u(compared) => "smaller than its U",
         Visibility::Estimable => "determined",
         Visibility::Mixed => "only in sums",
         Visibility::Unseen => "not at all",
@@ -225,6 +250,7 @@ fn figures(
         serde_json::json!({
             "name": compared.unknown.to_string(),
             "published_mm": compared.published_mm,
+            "standard_uncertainty_mm": is_seen(compared).then_some(compared.standard_uncertainty_mm),
             "published_other_mm": compared.other_mm,
             "fourteen_stations_mm": compared.fourteen_mm,
             "determined_by_the_circle": is_seen(compared),
@@ -249,4 +275,73 @@ fn figures(
             "unknowns": found.unknowns.iter().map(unknown).collect::<Vec<_>>(),
         },
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use grid_encoder::recording::{GridPoint, Place, Recording};
+    use machine::Kinematics;
+    use metrology::PerAxis;
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    /// A trace of 1 µm cos 7θ about a centre on Y, which no error of the model makes.
+    fn circle(centre_y_mm: f64) -> StationCircle {
+        let centre_mm = Vector3::new(0.0, centre_y_mm, 0.0);
+        let place = Place::circle(TestPlane::Xy, centre_mm, 50.0, 360);
+        let point = |k: u32| {
+            let angle_rad = f64::from(k).to_radians();
+            let positions = place.on_circle_mm(angle_rad);
+            let off_mm = 1e-3 * (7.0 * angle_rad).cos();
+            let [x_mm, y_mm] = [positions.0[0], positions.0[1]];
+            GridPoint {
+                positions,
+                sense: Vector3::zeros(),
+                velocity_mm_s: Vector3::zeros(),
+                reading_mm: [
+                    x_mm + off_mm * angle_rad.cos(),
+                    y_mm + off_mm * angle_rad.sin(),
+                ],
+                standard_uncertainty_mm: [1e-4; 2],
+                n_readings: 55,
+            }
+        };
+        StationCircle {
+            kinematics: Kinematics::of_chain(
+                "[w X' Y' b Z t]".parse().unwrap(),
+                PerAxis::default(),
+            ),
+            longest_rest: None,
+            recording: Recording {
+                run: 29,
+                points: (0..360).map(point).collect(),
+                place,
+            },
+        }
+    }
+
+    #[test]
+    fn val_numpy_a_value_below_its_u_is_marked_and_has_that_u() {
+        // numpy: 2 s √G_jj of ECY3, s = 0.7171372 µm over 350 degrees of freedom; G_jj = 305.2978² off the origin, 1.1926² at it.
+        for (centre_y_mm, expanded_um) in [(-150.0, 437.88), (0.0, 1.7105)] {
+            let sections = sections(&circle(centre_y_mm), None);
+            let section = &sections[0];
+            let rows = &section.tables[0].rows;
+            let row = rows.iter().find(|row| row[0] == "ECY3").unwrap();
+            let found_um: f64 = row[2].parse().unwrap();
+            assert!((found_um / expanded_um - 1.0).abs() < 5e-3, "{row:?}");
+            assert!(row[1].ends_with('~'), "{row:?}");
+            assert!(row.contains(&"smaller than its U".to_owned()), "{row:?}");
+            let answer = section.lines.join(" ");
+            assert!(answer.contains("with a U above the value (~)"), "{answer}");
+            let alone = &sections[1].answers[0];
+            assert!(
+                alone.contains("with a U above the value, marked ~"),
+                "{alone}"
+            );
+            let note = &section.tables[0].note;
+            assert!(note.contains("on the negative side odd powers have the other sign"));
+        }
+    }
 }

@@ -172,13 +172,15 @@ fn largest_location(evidence: &Evidence) -> Option<Tile> {
         let (value, u) = rounded(value, u);
         Some(format!("{} {value} ± {u} {unit}", curve.component))
     };
-    let tilt = largest(true).and_then(in_words);
-    let tilt = tilt.map_or_else(String::new, |tilt| format!("largest tilt {tilt}; "));
-    let value = in_words(largest(false)?)?;
+    let tilt = largest(true).and_then(|curve| Some((in_words(curve)?, curve.component)));
+    let tilt = tilt.map_or_else(String::new, |(tilt, component)| {
+        format!("largest tilt {tilt}, {}; ", component.in_words())
+    });
+    let shift = largest(false)?;
     Some(Tile::new(
         "largest location error",
-        value,
-        format!("{tilt}k = 2"),
+        in_words(shift)?,
+        format!("{}; {tilt}k = 2", shift.component.in_words()),
     ))
 }
 

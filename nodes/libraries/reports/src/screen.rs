@@ -125,6 +125,8 @@ pub struct Made {
     pub source: String,
     /// Commit of the software that recorded.
     pub recorded_by: Option<String>,
+    /// Whether nothing was measured: the figures are foreseen, the begin is when that was done, and the source is a plan.
+    pub is_foreseen: bool,
 }
 
 impl Made {
@@ -153,6 +155,20 @@ impl Made {
             end_nanos: between.map(|(_, end)| end),
             source: source.to_owned(),
             recorded_by: commit,
+            is_foreseen: false,
+        }
+    }
+
+    /// Of figures that a program foresees of a plan for a machine, at `now_nanos`.
+    #[must_use]
+    pub fn of_plan(software: Software, machine: &str, source: &str, now_nanos: i64) -> Self {
+        Self {
+            software,
+            machine: Some(machine.to_owned()),
+            begin_nanos: Some(now_nanos),
+            source: source.to_owned(),
+            is_foreseen: true,
+            ..Self::default()
         }
     }
 
@@ -189,14 +205,19 @@ impl Made {
 
     fn html(&self) -> Markup {
         let or_missing = |text: Option<String>| text.unwrap_or_else(|| NOT_STATED.to_owned());
+        let (when, what) = if self.is_foreseen {
+            ("Foreseen", "Plan")
+        } else {
+            ("Measured", "Data")
+        };
         html! {
             dl.facts {
                 dt { "Machine" } dd { (or_missing(self.machine.clone())) }
                 @if !self.namespaces.is_empty() {
                     dt { "Namespace" } dd { (self.namespaces.join(", ")) }
                 }
-                dt { "Measured" } dd { (or_missing(self.when())) }
-                dt { "Data" } dd { (self.source) }
+                dt { (when) } dd { (or_missing(self.when())) }
+                dt { (what) } dd { (self.source) }
                 dt { "Software" } dd { (self.software()) }
             }
         }
@@ -224,6 +245,8 @@ fn digits(commit: &str) -> &str {
 pub struct Screen {
     /// Where the figures are from.
     pub made: Option<Made>,
+    /// With which instruments, by whom and at which temperature: name and text.
+    pub conditions: Vec<(String, String)>,
     /// One sentence.
     pub verdict: Option<(String, Tone)>,
     /// What was found, the most important first.
@@ -242,6 +265,7 @@ impl Screen {
     /// This screen with that of another part behind it.
     pub fn join(&mut self, other: Self) {
         self.made = self.made.take().or(other.made);
+        self.conditions.extend(other.conditions);
         self.verdict = self.verdict.take().or(other.verdict);
         self.tiles.extend(other.tiles);
         self.lacks.extend(other.lacks);
@@ -275,6 +299,11 @@ impl Screen {
         html! {
             h1 { (title) }
             @if let Some(made) = &self.made { (made.html()) }
+            @if !self.conditions.is_empty() {
+                dl.facts {
+                    @for (name, text) in &self.conditions { dt { (name) } dd { (text) } }
+                }
+            }
             @if let Some((verdict, tone)) = &self.verdict {
                 p class=(format!("verdict {}", tone.class().unwrap_or_default())) { (verdict) }
             }
@@ -338,6 +367,7 @@ mod tests {
             end_nanos: Some(1_767_603_600_000_000_000),
             source: "runs/first/bag".to_owned(),
             recorded_by: Some("0123456789abcdef".to_owned()),
+            is_foreseen: false,
         }
     }
 
@@ -365,6 +395,38 @@ mod tests {
         };
         assert!(undated.as_json()["begin"].is_null());
         assert!(!undated.html().into_string().contains("Namespace"));
+        let plan = Made::of_plan(
+            made().software,
+            "vmc",
+            "plan.yaml",
+            1_767_600_000_000_000_000,
+        );
+        let html = plan.html().into_string();
+        for words in [
+            "<dd>vmc</dd>",
+            "<dt>Foreseen</dt><dd>2026-01-05 08:00:00 UTC</dd>",
+            "<dt>Plan</dt><dd>plan.yaml</dd>",
+        ] {
+            assert!(html.contains(words), "{words}: {html}");
+        }
+        assert!(!html.contains("Measured"), "{html}");
+    }
+
+    #[test]
+    fn instrument_operator_and_temperature_stand_before_the_verdict() {
+        let screen = Screen {
+            made: Some(made()),
+            conditions: vec![("Operator".to_owned(), "A. B.".to_owned())],
+            ..compensated(0.04, 0.002, "1 pose")
+        };
+        let html = screen.html("Tests").into_string();
+        let place = |words: &str| {
+            html.find(words)
+                .unwrap_or_else(|| panic!("{words}: {html}"))
+        };
+        assert!(place("<dt>Measured</dt>") < place("<dt>Operator</dt><dd>A. B.</dd>"));
+        assert!(place("A. B.") < place("Compensation takes"));
+        assert!(!html.contains("<details"));
     }
 
     #[test]

@@ -4,7 +4,9 @@ use std::fmt::Display;
 
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Width, presets};
 use maud::{Markup, html};
+use metrology::number::decimals_of;
 
+use super::minus::with_minus_signs;
 use super::page;
 use super::screen::Tile;
 use super::svg::unsigned_zero;
@@ -116,6 +118,13 @@ impl Section {
         }
     }
 
+    /// A line for every reading that is far from the others and counts.
+    pub fn name_far(&mut self, far: &[String]) {
+        for line in far {
+            self.warn("Far from the others", format!("{}.", capitalised(line)));
+        }
+    }
+
     /// For a terminal.
     #[must_use]
     pub fn terminal(&self) -> String {
@@ -133,7 +142,7 @@ impl Section {
                 text.push('\n');
             }
         }
-        text
+        with_minus_signs(&text).into_owned()
     }
 
     /// For a page: folded, its pictures first; tables stand behind a picture where there is one.
@@ -195,7 +204,7 @@ pub fn rounded(value: f64, uncertainty: f64) -> (String, String) {
     if !(value.is_finite() && uncertainty.is_finite() && uncertainty > 0.0) {
         return (unsigned_zero(format!("{value:.2}")), "—".to_owned());
     }
-    let decimals = (1.0 - uncertainty.log10().floor()).clamp(0.0, 9.0) as usize;
+    let decimals = decimals_of(uncertainty);
     (
         unsigned_zero(format!("{value:.decimals$}")),
         format!("{uncertainty:.decimals$}"),

@@ -12,21 +12,27 @@
 //! [`trial`] shows such runs beside the one that the table was made of.
 
 use anyhow::Result;
+use machine::MachineFile;
 
 use super::plot::{self, Plot, Trace};
 use super::section::{Drawing, Rows, Section, head, um};
-use crate::evaluate::stops::{SAME_MM, Stop, Stops};
+use super::svg::unsigned_zero;
+use crate::evaluate::budget::NOT_STATED;
+use crate::evaluate::correction::{BY_MOTOR, BY_OWN_SCALE, scale};
+use crate::evaluate::stops::{Stop, Stops};
 
 /// Of the stops of a direction each so-manyth is in the table that is tried.
 pub const TABLE_EVERY: usize = 2;
 /// Stops of one direction that a prediction needs.
 const LEAST_STOPS: usize = 5;
+/// Coverage factor of what is printed.
+const COVERAGE: f64 = 2.0;
 /// Deviations below which there is nothing to take out, µm.
 const WORTH_UM: f64 = 0.5;
 
-/// One part for all verifications along one axis; none without any.
+/// One part for all verifications along one axis; none without any. The machine file states the scale's certificate.
 #[must_use]
-pub fn section(all: &[Stops]) -> Option<Section> {
+pub fn section(all: &[Stops], machine: Option<&MachineFile>) -> Option<Section> {
     if all.is_empty() {
         return None;
     }
@@ -37,13 +43,14 @@ pub fn section(all: &[Stops]) -> Option<Section> {
             "stops",
             "p95",
             "max",
+            "± U (k = 2)",
             "mean up",
             "mean down",
             "slope / (µm/m)",
             "read by",
         ]),
-        rows: all.iter().map(row).collect(),
-        note: "Sizes of the deviations; the slope is that of a straight line through all."
+        rows: all.iter().map(|stops| row(stops, machine)).collect(),
+        note: "Sizes of the deviations; the slope is that of a straight line through all. U: of the scale at the stop farthest from zero, by its certificate in the machine file (scale_expanded_uncertainty_um, scale_expanded_uncertainty_um_per_m); its temperature is not in it."
             .to_owned(),
     });
     let predicted: Vec<_> = all
@@ -65,11 +72,27 @@ pub fn section(all: &[Stops]) -> Option<Section> {
             note: "Predicted: a table of every second stop, straight lines between. It adds minus the deviation to the command; with the wrong sign errors double.".to_owned(),
         });
     }
-    section.figures = figures(&section.title, all);
+    section.figures = figures(&section.title, all, machine);
     Some(section)
 }
 
-fn row(stops: &Stops) -> Vec<String> {
+/// Why the deviations are no figures of the standard.
+const fn label(stops: &Stops) -> &'static str {
+    if stops.by_scale {
+        BY_OWN_SCALE
+    } else {
+        BY_MOTOR
+    }
+}
+
+/// U (k = 2) of the scale at the stop that is farthest from zero, mm, where it was read and its certificate is stated.
+fn expanded_mm(stops: &Stops, machine: Option<&MachineFile>) -> Option<f64> {
+    let scale = scale(machine?, stops.axis).filter(|_| stops.by_scale)?;
+    let sizes_mm = stops.stops.iter().map(|stop| stop.commanded_mm.abs());
+    Some(COVERAGE * scale.standard_mm(sizes_mm.fold(0.0, f64::max)))
+}
+
+fn row(stops: &Stops, machine: Option<&MachineFile>) -> Vec<String> {
     let deviations = || stops.stops.iter().map(|stop| stop.deviation_mm);
     let side = |up: bool| {
         let of = stops.stops.iter().filter(|stop| stop.up == up);
@@ -85,15 +108,11 @@ fn row(stops: &Stops) -> Vec<String> {
         stops.stops.len().to_string(),
         um(p95(deviations())),
         um(deviations().map(f64::abs).fold(0.0, f64::max)),
+        expanded_mm(stops, machine).map_or_else(|| NOT_STATED.to_owned(), um),
         um(side(true)),
         um(side(false)),
-        format!("{:.1}", slope(&stops.stops) * 1e6),
-        if stops.by_scale {
-            "linear scale"
-        } else {
-            "control"
-        }
-        .to_owned(),
+        um_per_m(slope(&stops.stops)),
+        label(stops).to_owned(),
     ]
 }
 
@@ -110,6 +129,11 @@ fn p95(values: impl Iterator<Item = f64>) -> f64 {
         .get(place.saturating_sub(1))
         .copied()
         .unwrap_or(f64::NAN)
+}
+
+/// A slope in µm/m, a zero without a sign.
+fn um_per_m(slope: f64) -> String {
+    unsigned_zero(format!("{:.1}", slope * 1e6))
 }
 
 /// Of a straight line through all stops, mm/mm.
@@ -163,7 +187,7 @@ pub fn trial(title: &str, runs: &[(&str, &Stops)]) -> Result<Section> {
             um(left.p95_between_mm),
             um(left.rms_mm),
             format!("{:.3}", left.rms_mm / bare_mm),
-            format!("{:.1}", slope(&stops.stops) * 1e6),
+            um_per_m(slope(&stops.stops)),
         ]
     });
     let mut section = Section::new(title);
@@ -234,10 +258,7 @@ impl Left {
 
 /// Deviations at the stops that are in no table, mm.
 fn between(sides: &[Vec<Stop>; 2], in_table_mm: &[f64]) -> impl Iterator<Item = f64> {
-    let is_in = move |stop: &&Stop| {
-        let near = |at_mm: &f64| (at_mm - stop.commanded_mm).abs() < SAME_MM;
-        in_table_mm.iter().any(near)
-    };
+    let is_in = move |stop: &&Stop| in_table_mm.iter().any(|at_mm| stop.is_at(*at_mm));
     let left = sides.iter().flatten().filter(move |stop| !is_in(stop));
     left.map(|stop| stop.deviation_mm)
 }
@@ -254,13 +275,15 @@ fn traces(name: &str, stops: &Stops) -> [Trace; 2] {
     })
 }
 
-fn figures(title: &str, all: &[Stops]) -> serde_json::Value {
+fn figures(title: &str, all: &[Stops], machine: Option<&MachineFile>) -> serde_json::Value {
     let one = |stops: &Stops| {
         let deviations = || stops.stops.iter().map(|stop| stop.deviation_mm);
         serde_json::json!({
             "run": stops.run,
             "axis": stops.axis.to_string(),
             "by_scale": stops.by_scale,
+            "label": label(stops),
+            "scale_expanded_uncertainty_mm": expanded_mm(stops, machine),
             "compensated": stops.compensated,
             "stops": stops.stops.len(),
             "p95_mm": p95(deviations()),
@@ -302,13 +325,40 @@ mod tests {
         assert!(after < 1e-9, "{after}");
         assert!((wrong - 2.0 * before).abs() < 1e-9 && before > 10.0);
         assert!((slope(&long.stops) - 1e-4).abs() < 1e-12);
-        let section = section(&[long]).unwrap();
+        assert_eq!([um_per_m(-1e-9), um_per_m(-1e-6)], ["0.0", "-1.0"]);
+        let section = section(&[long], None).unwrap();
         assert!(
             section.terminal().contains("100.0"),
             "{}",
             section.terminal()
         );
-        assert!(super::section(&[]).is_none());
+        assert!(super::section(&[], None).is_none());
+    }
+
+    #[test]
+    fn what_the_machines_own_scale_read_has_its_label_and_the_scales_uncertainty() {
+        // scale_expanded_uncertainty_um: 1.0 and scale_expanded_uncertainty_um_per_m: 3.0: by hand 1.45 µm at 150 mm.
+        let machine = include_str!("../../../../launch_configs/dual_loop/machine.yaml");
+        let machine = MachineFile::parse(machine, "machine.yaml").unwrap();
+        let read = |by_scale| Stops {
+            by_scale,
+            ..stops(|p, _| 1e-5 * p)
+        };
+        let section = section(&[read(true), read(false)], Some(&machine)).unwrap();
+        let rows = &section.tables[0].rows;
+        assert_eq!(
+            (rows[0][4].as_str(), rows[1][4].as_str()),
+            ("1.45", NOT_STATED)
+        );
+        assert_eq!(
+            (rows[0][8].as_str(), rows[1][8].as_str()),
+            (BY_OWN_SCALE, BY_MOTOR)
+        );
+        let found = &section.figures["stops"];
+        assert_eq!(found[0]["label"], BY_OWN_SCALE);
+        let u_mm = found[0]["scale_expanded_uncertainty_mm"].as_f64().unwrap();
+        assert!((u_mm - 1.45e-3).abs() < 1e-12, "{u_mm}");
+        assert!(found[1]["scale_expanded_uncertainty_mm"].is_null());
     }
 
     #[test]

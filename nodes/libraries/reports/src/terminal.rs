@@ -5,6 +5,7 @@
 
 use std::path::Path;
 
+use super::minus::with_minus_signs;
 use super::section::{Rows, Section, Warning, laid_out};
 
 /// Most lines of the short text.
@@ -159,7 +160,7 @@ pub fn short(lines: &[String], parts: &[Part], room: &Room<'_>) -> String {
         rows_left,
         room.page,
     ));
-    text.join("\n")
+    with_minus_signs(&text.join("\n")).into_owned()
 }
 
 fn name_what_is_left(tables: usize, rows: usize, page: Option<&Path>) -> String {

@@ -12,13 +12,19 @@ use crate::evaluate::circle_reading::CircleReading;
 use crate::evaluate::circles::{self, CircleRecording};
 use crate::evaluate::correction::{About, Measured};
 use crate::evaluate::course::Course;
+use crate::evaluate::imported::{Imported, OfMap};
 use crate::evaluate::linear::LinearTest;
 use crate::evaluate::test_conditions::{Readings, TestConditions};
+
+mod artefacts;
+mod facts;
 
 /// The conditions: whole for page and JSON, a few lines for a terminal.
 pub struct Conditions {
     /// The whole.
     pub section: Section,
+    /// Instruments, operator and temperatures, for the first screen: name and text.
+    pub facts: Vec<(String, String)>,
     short: Vec<String>,
 }
 
@@ -82,13 +88,10 @@ pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
     let run = run_of(seen, budget, tests);
     let instruments = instruments_of(seen, budget, tests);
     let correction = correction_of(tests, budget);
-    let rows = run.iter().chain(&instruments).map(Condition::row);
-    let last = vec!["correction to 20 °C".to_owned(), correction.clone()];
-    section.tables.push(Rows {
-        head: head(&["condition", "value"]),
-        rows: rows.chain([last]).collect(),
-        note: String::new(),
-    });
+    let artefacts = artefacts::conditions(tests);
+    section
+        .tables
+        .push(table_of([&run, &instruments, &artefacts], &correction));
     let temperatures: Vec<Vec<String>> = (seen.thermometers.iter())
         .map(|(name, read)| temperature_row(name, read))
         .collect();
@@ -122,18 +125,43 @@ pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
     }
     short.push(format!("Correction to 20 °C: {correction}."));
     short.retain(|line| !line.is_empty());
-    section.figures = json!({
-        "begin": seen.between.map(|(first, _)| date(first)),
-        "end": seen.between.map(|(_, last)| date(last)),
-        "feeds_mm_min": seen.feeds_mm_s.iter().map(|feed| feed * 60.0).collect::<Vec<f64>>(),
-        "production_before_s": seen.production_before_s,
+    section.figures = figures_of(seen, (budget, tests), &correction);
+    Conditions {
+        facts: facts::of(seen, budget, tests),
+        section,
+        short,
+    }
+}
+
+fn table_of(conditions: [&[Condition]; 3], correction: &str) -> Rows {
+    let rows = conditions.into_iter().flatten().map(Condition::row);
+    let last = vec!["correction to 20 °C".to_owned(), correction.to_owned()];
+    Rows {
+        head: head(&["condition", "value"]),
+        rows: rows.chain([last]).collect(),
+        note: String::new(),
+    }
+}
+
+/// The conditions for machines.
+fn figures_of(
+    seen: &TestConditions,
+    (budget, tests): (Option<&Budget>, Option<&Tests>),
+    correction: &str,
+) -> Value {
+    let imported = seen.imported.as_ref();
+    let is_made_up = imported.is_some_and(Imported::is_motion_made_up);
+    json!({
+        "begin": seen.nanos().map(|(first, _)| date(Stamp::from_nanos(first))),
+        "end": seen.nanos().filter(|_| !is_made_up).map(|(_, last)| date(Stamp::from_nanos(last))),
+        "feeds_mm_min": feeds_mm_min(seen),
+        "production_before_s": seen.imported.is_none().then_some(seen.production_before_s),
         "warm_up": budget.and_then(|budget| budget.warm_up.clone()),
         "operator": budget.and_then(|budget| budget.operator.clone()),
         "instruments": instruments_json(seen, budget, tests),
         "thermometers": seen.thermometers.iter().map(temperature_json).collect::<Vec<Value>>(),
         "correction_to_20_degc": correction,
-    });
-    Conditions { section, short }
+    })
 }
 
 /// Fewest readings of a thermometer that make a curve.
@@ -222,11 +250,32 @@ fn run_of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
     let of_rotary = tests
         .into_iter()
         .flat_map(|tests| &tests.rotary_positioning);
+    let of_stations = tests.into_iter().flat_map(|tests| &tests.station_circles);
     let dwells = of_lines
         .filter_map(|test| test.longest_rest)
-        .chain(of_rotary.filter_map(|test| test.longest_rest));
+        .chain(of_rotary.filter_map(|test| test.longest_rest))
+        .chain(of_stations.filter_map(|circle| circle.longest_rest));
     let dwells = listed(dwells.map(|rest| format!("{:.1}", rest.as_secs_f64())));
-    let stated = |text: fn(&Budget) -> &Option<String>| budget.and_then(|one| text(one).clone());
+    let mut conditions = match &seen.imported {
+        Some(table) => vec![
+            date_of_table(table, between),
+            of_table("feed", table.feed()),
+            of_table("dwell", table.dwell()),
+            Condition::new("production before the first test", None, NOT_IN_TABLE),
+        ],
+        None => of_recording(seen, between, feeds, dwells),
+    };
+    conditions.extend(people(budget));
+    conditions
+}
+
+/// A condition of a recording.
+fn of_recording(
+    seen: &TestConditions,
+    between: Option<String>,
+    feeds: Option<String>,
+    dwells: Option<String>,
+) -> Vec<Condition> {
     let before_min = seen.production_before_s / 60.0;
     vec![
         Condition::new("date", between, "the bag holds no test"),
@@ -245,6 +294,45 @@ fn run_of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
             Some(format!("{before_min:.0} min in this bag")),
             "",
         ),
+    ]
+}
+
+/// Where a table and its map say nothing.
+const NOT_IN_TABLE: &str = "not in the table";
+
+/// When the measurement of a table began; a log has times of its own.
+fn date_of_table(table: &Imported, between: Option<String>) -> Condition {
+    let begin = of_table("date", table.begin());
+    if table.is_motion_made_up() || begin.value.is_none() {
+        return begin;
+    }
+    Condition::new("date", between, NOT_IN_TABLE)
+}
+
+/// A value of a map; one that was assumed is no condition of the measurement.
+fn of_table(name: &str, value: OfMap) -> Condition {
+    match value {
+        OfMap::Stated(words) => Condition::new(name, Some(words), ""),
+        OfMap::Assumed(words) => {
+            let place = format!("{NOT_IN_TABLE}; {words} was assumed");
+            Condition::new(name, None, place)
+        }
+        OfMap::Absent => Condition::new(name, None, NOT_IN_TABLE),
+    }
+}
+
+/// Programmed feeds, mm/min; of a table that which a person stated.
+fn feeds_mm_min(seen: &TestConditions) -> Vec<f64> {
+    match &seen.imported {
+        Some(table) => table.stated_feed_mm_min().into_iter().collect(),
+        None => seen.feeds_mm_s.iter().map(|feed| feed * 60.0).collect(),
+    }
+}
+
+/// What a person states beside the recording.
+fn people(budget: Option<&Budget>) -> [Condition; 2] {
+    let stated = |text: fn(&Budget) -> &Option<String>| budget.and_then(|one| text(one).clone());
+    [
         Condition::new(
             "warm-up",
             stated(|budget| &budget.warm_up),
@@ -417,6 +505,8 @@ mod tests {
                 targets_rad: vec![0.0, 1.0],
                 up_rad: vec![],
                 down_rad: vec![],
+                mean_rad: 0.0,
+                outlying: Default::default(),
                 left_out: vec![],
                 longest_rest: Some(Span::from_nanos(2_000_000_000)),
                 has_readings: true,
@@ -464,6 +554,11 @@ mod tests {
             "2026-01-05 08:00:00 UTC to 2026-01-05 09:00:00 UTC"
         );
         assert_eq!(cell(&silent, "feed"), "6000 mm/min");
+        let fact = |conditions: &Conditions, name: &str| -> String {
+            let mut facts = conditions.facts.iter();
+            facts.find(|(known, _)| known == name).unwrap().1.clone()
+        };
+        assert_eq!(fact(&silent, "Temperature"), NOT_STATED);
         assert_eq!(
             cell(&silent, "length reference, serial number"),
             "not stated (instruments.length_reference.serial_number in budget.yaml)"
@@ -490,6 +585,10 @@ mod tests {
         let whole = of(&seen, Some(&budget), None);
         assert_eq!(cell(&whole, "length reference, serial number"), "12-3");
         assert_eq!(whole.section.figures["operator"], "A. B.");
+        assert_eq!(fact(&whole, "Operator"), "A. B.");
+        let laser = "a laser; serial number 12-3; certificate K 7 of 2026-01-02";
+        assert_eq!(fact(&whole, "Length reference"), laser);
+        assert_eq!(fact(&whole, "Temperature"), "bed 21.50 to 21.50 °C");
         let instrument = &whole.section.figures["instruments"][0];
         assert_eq!(instrument["certificate"], "K 7 of 2026-01-02");
         let terminal = whole.terminal();

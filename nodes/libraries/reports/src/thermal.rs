@@ -29,18 +29,20 @@ pub fn write(title: &str, evidence: &Evidence) -> Result<Report> {
     let errors = span.map_or_else(Vec::new, |span| tool_errors(&evidence.verifications, &span));
     let mut lines = latency::headline(evidence);
     lines.extend(headline(&errors, span.as_ref()));
-    lines.extend(blocks::remark(evidence));
+    let remark = blocks::remark(evidence);
+    lines.extend(remark.clone());
     let mut figures = latency::figures(evidence);
     figures["tool_error_in_blocks_span"] = figures_of(&errors, span.as_ref());
-    figures["block_heights"] = blocks::remark(evidence).into();
+    // The verdict and the parts have the other sentences.
     let body = html! {
-        @for line in &lines { p { (line) } }
+        @if let Some(remark) = &remark { p { (remark) } }
         (over_time::section(evidence)?)
         (errors_section(&errors, span.as_ref()))
         (drift_section(evidence)?)
         (predictions::section(evidence)?)
         (latency::section(evidence)?)
     };
+    figures["block_heights"] = remark.into();
     Ok(Report {
         title: title.to_owned(),
         screen: screen(evidence, &errors)?,

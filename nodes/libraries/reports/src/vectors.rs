@@ -5,7 +5,8 @@
 //! ```
 //!
 //! m is one of 1, 2 and 5 times a power of ten, the greatest with which no arrow is longer than a sixth of the drawing. Of many
-//! poses those are drawn that are nearest to the middles of equal boxes, the same before and after.
+//! poses those are drawn that are nearest to the middles of equal boxes, the same before and after. A bar below each projection
+//! is as long as an error of a round size there.
 
 use std::fmt::Write as _;
 
@@ -75,6 +76,11 @@ fn thinned(field: &Field, low: &Vector3<f64>, high: &Vector3<f64>) -> Vec<Arrow>
 /// m of (1).
 fn magnification(greatest_error_mm: f64, greatest_side_mm: f64) -> f64 {
     let most = LONGEST * greatest_side_mm / greatest_error_mm.max(1e-9);
+    round_below(most)
+}
+
+/// The greatest of 1, 2 and 5 times a power of ten that is not above `most`.
+fn round_below(most: f64) -> f64 {
     // The inverse of a round number is one too.
     1.0 / round_step(1.0 / most)
 }
@@ -94,15 +100,17 @@ pub fn picture(fields: &[Field], of: &str) -> Option<Markup> {
     let named: Vec<(usize, &str, &str)> = { fields.iter().enumerate() }
         .map(|(place, field)| (place, "line", field.name.as_str()))
         .collect();
-    let panels = PLANES.map(|plane| panel(plane, &thinned, (&low, &high), m));
+    let bar_mm = round_below(greatest_mm.max(1e-9));
+    let panels = PLANES.map(|plane| panel(plane, &thinned, (&low, &high), (m, bar_mm)));
     let caption = format!(
-        "{of}, {} times enlarged, at {n} of {} poses in three projections; the longest arrow is {} µm.",
+        "{of}, {} times enlarged, at {n} of {} poses in three projections; the bar is {} µm of error, the longest arrow {} µm.",
         short(m),
         fields
             .iter()
             .map(|field| field.arrows.len())
             .max()
             .unwrap_or(0),
+        length_um(bar_mm),
         short(greatest_mm * 1e3)
     );
     Some(html! {
@@ -114,11 +122,18 @@ pub fn picture(fields: &[Field], of: &str) -> Option<Markup> {
     })
 }
 
+/// A round length without decimals that it does not need, µm.
+fn length_um(bar_mm: f64) -> String {
+    let um = bar_mm * 1e3;
+    let decimals = (-(um.log10() + 1e-9).floor()).clamp(0.0, 6.0) as usize;
+    format!("{um:.decimals$}")
+}
+
 fn panel(
     plane: [Axis; 2],
     fields: &[Vec<Arrow>],
     (low, high): (&Vector3<f64>, &Vector3<f64>),
-    m: f64,
+    (m, bar_mm): (f64, f64),
 ) -> String {
     let [u, v] = plane.map(Axis::index);
     let [left, right, top] = VECTOR_FRAME;
@@ -137,10 +152,11 @@ fn panel(
         "<svg class=\"plot\" role=\"img\" aria-label=\"error vectors in {}{}\" viewBox=\"0 0 {VECTORS_WIDTH} {}\">",
         plane[0],
         plane[1],
-        bottom + 54.0
+        bottom + 78.0
     );
     // A text has no error of writing.
     let _ = frame(&mut text, plane, &scales);
+    let _ = scale_bar(&mut text, (left, bottom + 66.0), (bar_mm, m * px_per_mm));
     for (colour, arrows) in fields.iter().enumerate() {
         let _ = draw(&mut text, colour, arrows, ([u, v], m * px_per_mm), &scales);
     }
@@ -177,6 +193,23 @@ fn frame(text: &mut String, plane: [Axis; 2], (x, y): &(Scale, Scale)) -> std::f
         bottom + 44.0,
         plane[0],
         plane[1]
+    )
+}
+
+/// A bar as long as an arrow of `bar_mm`, with its size.
+fn scale_bar(
+    text: &mut String,
+    (left, y): (f64, f64),
+    (bar_mm, px_per_mm): (f64, f64),
+) -> std::fmt::Result {
+    let right = left + bar_mm * px_per_mm;
+    write!(
+        text,
+        "<path class=\"scale\" fill=\"none\" stroke=\"currentColor\" stroke-width=\"2\" d=\"M{left:.1} {:.1}v10m0 -5H{right:.1}m0 -5v10\"/><text x=\"{:.1}\" y=\"{:.1}\">{} µm of error</text>",
+        y - 5.0,
+        right + 8.0,
+        y + 5.0,
+        length_um(bar_mm)
     )
 }
 
@@ -248,6 +281,37 @@ mod tests {
             "10.0 µm",
         ] {
             assert!(text.contains(words), "{words}: {text}");
+        }
+    }
+
+    #[test]
+    fn the_bar_is_as_long_as_an_arrow_of_its_size() {
+        let text = picture(&[field(Vector3::new(0.012, 0.0, 0.0))], "Error")
+            .unwrap()
+            .into_string();
+        assert_eq!(text.matches("10 µm of error</text>").count(), 3, "{text}");
+        let number = |after: &str, mark: &str| -> f64 {
+            let digits = after.split(mark).nth(1).unwrap();
+            let mut digits = digits.split(|c: char| !"0123456789.-".contains(c));
+            digits.next().unwrap().parse().unwrap()
+        };
+        let bar = text.split("class=\"scale\"").nth(1).unwrap();
+        let bar = bar.split(" d=\"").nth(1).unwrap();
+        let bar_px = number(bar, "H") - number(bar, "M");
+        let arrow = text
+            .split("<path stroke-width=\"1.6\" d=\"")
+            .nth(1)
+            .unwrap();
+        // An arrow of 12 µm along X, of which the bar is 10.
+        let wanted_px = number(arrow, "l") * 10.0 / 12.0;
+        assert!((bar_px - wanted_px).abs() < 0.2, "{bar_px} {wanted_px}");
+        for (mm, words) in [
+            (0.02, "20"),
+            (0.0005, "0.5"),
+            (0.00002, "0.02"),
+            (0.1, "100"),
+        ] {
+            assert_eq!(length_um(mm), words);
         }
     }
 

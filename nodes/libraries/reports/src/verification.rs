@@ -95,6 +95,13 @@ pub fn section(verifications: &[Verification]) -> Option<Section> {
                 with.poses.len()
             ));
         }
+    } else {
+        let p95 = seen.iter().map(|verification| {
+            let p95_mm = quantile_mm(&sizes_mm(verification, false), 0.95);
+            format!("{} µm ({})", um(p95_mm), verification.label)
+        });
+        let p95: Vec<String> = p95.collect();
+        section.answer(format!("p95: {}.", p95.join(", ")));
     }
     let rows = seen.iter().map(|verification| {
         vec![
@@ -142,13 +149,39 @@ pub fn screen(verifications: &[Verification]) -> Screen {
                 let labels = format!("{}, {}", without.label, with.label);
                 ((without, with), format!("{} poses: {labels}", n(with)))
             }
-            _ => return Screen::default(),
+            _ => return unpaired(verifications),
         },
     };
     let mut screen = compensated(p95_mm(pair.0), p95_mm(pair.1), &what);
     screen.tiles.extend(about_datum(pair));
     screen.picture = picture(pair);
     screen
+}
+
+/// A tile of the last verification, where none was made without and with compensation.
+fn unpaired(verifications: &[Verification]) -> Screen {
+    let p95_um = |verification: &Verification| {
+        short(quantile_mm(&sizes_mm(verification, false), 0.95) * 1e3)
+    };
+    let mut seen = verifications.iter().filter(|v| !v.poses.is_empty());
+    let Some(last) = seen.next_back() else {
+        return Screen::default();
+    };
+    let others = seen.map(|one| format!("; {}: {} µm", one.label, p95_um(one)));
+    let n = last.poses.len();
+    let more = format!(
+        "p95 of {n} poses: {}{}",
+        last.label,
+        others.collect::<String>()
+    );
+    Screen {
+        tiles: vec![Tile::new(
+            "tool error",
+            format!("{} µm", p95_um(last)),
+            more,
+        )],
+        ..Screen::default()
+    }
 }
 
 /// The tool error about a datum without and with compensation, as a tile; `None` where poses have none.
@@ -242,7 +275,20 @@ mod tests {
         assert!(screen.verdict.is_some() && screen.picture.is_some());
         assert_eq!(screen.tiles[1].value, "0 → 2.00 µm");
         assert_eq!(screen.tiles[1].tone, Tone::Bad);
-        assert!(super::screen(&[moved]).verdict.is_none());
+        let alone = super::screen(&[
+            Verification {
+                label: "cold".to_owned(),
+                ..moved.clone()
+            },
+            Verification {
+                label: "after 1 h".to_owned(),
+                ..moved
+            },
+        ]);
+        assert!(alone.verdict.is_none());
+        let more = &alone.tiles[0].more;
+        let words = "p95 of 27 poses: after 1 h; cold: ";
+        assert!(more.starts_with(words), "{more}");
         let named = |label: &str, is_compensated| Verification {
             label: label.to_owned(),
             is_compensated,

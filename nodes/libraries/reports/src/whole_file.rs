@@ -319,8 +319,15 @@ impl WholeFolder {
     /// # Errors
     /// When it cannot be put there; then it is removed.
     pub fn finish(self) -> Result<()> {
-        let shown = || self.place.display().to_string();
-        std::fs::rename(&self.path, &self.place).with_context(shown)
+        let shown = self.place.display();
+        std::fs::rename(&self.path, &self.place).map_err(|error| match error.kind() {
+            ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists | ErrorKind::NotADirectory => {
+                anyhow!(
+                    "{shown}: was made by another process meanwhile, and not overwritten: name another folder"
+                )
+            }
+            _ => anyhow!("{shown}: {error}"),
+        })
     }
 }
 
@@ -341,6 +348,32 @@ mod tests {
         drop(ending);
         assert!(starts.join().unwrap().unwrap().success());
         assert!(began.exists());
+    }
+
+    #[test]
+    fn a_place_that_another_process_filled_meanwhile_stays_as_it_is() {
+        let home = tempfile::tempdir().unwrap();
+        for (name, is_folder) in [("folder", true), ("file", false)] {
+            let place = home.path().join(name);
+            let whole = WholeFolder::begin(&place).unwrap();
+            std::fs::create_dir(whole.path()).unwrap();
+            let other = if is_folder {
+                std::fs::create_dir(&place).unwrap();
+                place.join("a")
+            } else {
+                place.clone()
+            };
+            std::fs::write(&other, "theirs").unwrap();
+            let refused = whole.finish().unwrap_err().to_string();
+            let words =
+                format!("{name}: was made by another process meanwhile, and not overwritten");
+            assert!(refused.contains(&words), "{refused}");
+            assert_eq!(std::fs::read_to_string(&other).unwrap(), "theirs");
+            assert_eq!(std::fs::read_dir(home.path()).unwrap().count(), 1);
+            if is_folder {
+                std::fs::remove_dir_all(&place).unwrap();
+            }
+        }
     }
 
     #[test]

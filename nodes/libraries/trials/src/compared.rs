@@ -40,6 +40,11 @@ const PLATES: [&str; 3] = ["middle", "side", "front"];
 const FACES: [&str; 4] = ["block_1.x", "block_1.y", "block_1.z", "block_2.x"];
 /// Most set-ups that a random programme tries.
 const MOST_SETUPS: usize = 40;
+/// Overrun of runs that stop at their targets, and of scans, which reach their feed before the first one, mm.
+const STOP_OVERRUN_MM: f64 = 5.0;
+const SCAN_OVERRUN_MM: f64 = 15.0;
+/// Greatest feed of a scan that this overrun is enough for on every drawn machine, m/min.
+const SCAN_FEED_M_MIN: f64 = 3.0;
 /// Way from rest to a circle and back, and from touch to touch, min.
 const APPROACH_MIN: f64 = 0.25;
 const TOUCH_MIN: f64 = 0.1;
@@ -240,14 +245,14 @@ fn along(
     let ends = [beam.from_mm[axis.index()], beam.to_mm[axis.index()]];
     let (from_mm, to_mm) = (ends[0] + BEAM_MARGIN_MM, ends[1] - BEAM_MARGIN_MM);
     let spacing_mm = (to_mm - from_mm) / f64::from(targets - 1);
-    let what = if rest.is_empty() {
-        "scan"
+    let (what, overrun_mm) = if rest.is_empty() {
+        ("scan", SCAN_OVERRUN_MM)
     } else {
-        "positioning"
+        ("positioning", STOP_OVERRUN_MM)
     };
     let step = format!(
         "{{do: {what}, axis: {axis}, from_mm: {from_mm:.1}, to_mm: {to_mm:.1}, spacing_mm: {spacing_mm:.1}, runs: {runs}, \
-         {rest}feed_mm_min: {feed_mm_min:.1}, overrun_mm: 5.0, beam: {}}}",
+         {rest}feed_mm_min: {feed_mm_min:.1}, overrun_mm: {overrun_mm:.1}, beam: {}}}",
         beam.id
     );
     Some((step, to_mm - from_mm))
@@ -316,8 +321,9 @@ fn drawn_test(
         3..6 => {
             let axis = Axis::LINEAR[kind - 3];
             let targets = random.random_range(5..=21_u32);
-            let feed_mm_min = 1000.0 * random.random_range(1.0_f64..12.0).round();
             let is_scan: bool = random.random();
+            let most_m_min = if is_scan { SCAN_FEED_M_MIN } else { 12.0 };
+            let feed_mm_min = 1000.0 * random.random_range(1.0..most_m_min).round();
             let rest = if is_scan { "" } else { "dwell_s: 1.0, " };
             let (step, way_mm) = along(machine, axis, targets, repeats, rest, feed_mm_min)?;
             let stops_min = if is_scan {

@@ -55,6 +55,7 @@ pub mod stick_slip;
 pub mod straightness;
 pub mod structural_ringing;
 pub mod stylus_jump;
+pub mod thermal_shift;
 pub mod thermometer_lag;
 pub mod thermometer_noise;
 pub mod thermometer_offset;
@@ -115,6 +116,7 @@ pub static CATALOGUE: &[&Kind] = &[
     &straightness::KIND,
     &structural_ringing::KIND,
     &stylus_jump::KIND,
+    &thermal_shift::KIND,
     &thermometer_lag::KIND,
     &thermometer_noise::KIND,
     &thermometer_offset::KIND,

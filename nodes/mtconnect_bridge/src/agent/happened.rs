@@ -21,6 +21,7 @@ impl AgentLink {
     ) {
         self.progress = true;
         self.unreadable = 0;
+        self.out_of_range = 0;
         if self.meet(header.instance_id, out) {
             return self.ask_again(at, out);
         }

@@ -20,6 +20,21 @@ impl Once {
             .is_some_and(|(first, _)| *first <= at)
     }
 
+    /// What of a time was not covered.
+    pub fn missing(&self, from: Stamp<Machine>, to: Stamp<Machine>) -> Vec<Piece> {
+        let mut missing = Vec::new();
+        let mut begin = from;
+        for &(first, last) in &self.pieces {
+            if first > begin {
+                missing.push((begin, first.min(to)));
+            }
+            begin = begin.max(last);
+        }
+        missing.push((begin, to));
+        missing.retain(|(first, last)| first < last);
+        missing
+    }
+
     /// Notes a piece as covered; returns what of it is new.
     pub fn tell(&mut self, from: Stamp<Machine>, to: Stamp<Machine>) -> Vec<Piece> {
         if to <= from {
@@ -62,6 +77,13 @@ mod tests {
         assert_eq!(tell(5, 70), []);
         assert_eq!(tell(9, 3), []);
         assert_eq!(once.pieces, [(at(5), at(70))]);
+        let missing = |from, to| -> Vec<(i64, i64)> {
+            let all = once.missing(at(from), at(to));
+            all.iter().map(|(a, b)| (a.nanos(), b.nanos())).collect()
+        };
+        assert_eq!(missing(0, 80), [(0, 5), (70, 80)]);
+        assert_eq!(missing(10, 60), []);
+        assert_eq!(missing(70, 75), [(70, 75)]);
         let has = [4, 5, 69, 70].map(|nanos| once.has(at(nanos)));
         assert_eq!(has, [false, true, true, false]);
     }

@@ -19,6 +19,11 @@ use crate::text;
 /// A longer pause counts as a leap of the machine's clock.
 const LONGEST_PAUSE: Span = Span::from_nanos(43_200_000_000_000);
 
+/// A span without a line that is worth a word, s: a machine at work changes something every few seconds.
+const MIN_SILENCE_S: f64 = 120.0;
+/// Such spans that are kept.
+const MOST_SILENT: usize = 1_000;
+
 /// The part of a log that was asked for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shift {
@@ -32,6 +37,10 @@ pub struct Shift {
     pub leaps: Vec<Leap>,
     /// Readings of the spindle that are far above the others, and count.
     pub doubtful: Vec<DoubtfulSpeed>,
+    /// Spans of the range in which the log does not say how fast the spindle turns: it stands in the programs.
+    pub without_spindle: Vec<(Stamp<Machine>, Stamp<Machine>)>,
+    /// Spans of the range, longer than a line of the programs, in which the log has no line: what it said last holds.
+    pub silent: Vec<(Stamp<Machine>, Stamp<Machine>)>,
     /// Whether nothing is missing that would change the programs.
     pub is_whole: bool,
 }
@@ -49,6 +58,7 @@ struct Reader<'a> {
     numbers: u64,
     /// The first stamp that is a number and no date, ms.
     first_count_ms: Option<f64>,
+    silent: Vec<(Stamp<Machine>, Stamp<Machine>)>,
 }
 
 impl Reader<'_> {
@@ -64,6 +74,7 @@ impl Reader<'_> {
             let _ = self.first_count_ms.get_or_insert(at_ms);
         }
         let at = self.clock.stamp(time, Stamp::<Host>::default());
+        self.hear(at);
         match self.pieces.last_mut() {
             Some((first, last)) => (*first, *last) = ((*first).min(at), (*last).max(at)),
             None => self.pieces.push((at, at)),
@@ -94,6 +105,18 @@ impl Reader<'_> {
             if !self.cutter.take(at, event) {
                 self.account.leave("values of a time told before", line);
             }
+        }
+    }
+
+    /// Notes the span before a line where it is a long one within the order.
+    fn hear(&mut self, at: Stamp<Machine>) {
+        let Some(&(_, last)) = self.pieces.last() else {
+            return;
+        };
+        let (from, to) = (last.max(self.order.from), at.min(self.order.to));
+        let least_s = self.order.bin_s.max(MIN_SILENCE_S);
+        if (to - from).as_secs_f64() > least_s && self.silent.len() < MOST_SILENT {
+            self.silent.push((from, to));
         }
     }
 
@@ -207,6 +230,7 @@ pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, 
         pieces: Vec::new(),
         numbers: 0,
         first_count_ms: None,
+        silent: Vec::new(),
     };
     let leaps = read(&log.text, &mut reader);
     let covered = reader.covered();
@@ -219,10 +243,16 @@ pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, 
         });
     }
     reader.cutter.take(order.to, Event::Spindle(None));
-    let covered_s: f64 = covered
-        .iter()
-        .map(|(first, last)| (*last - *first).as_secs_f64())
-        .sum();
+    let without_spindle = reader.cutter.turned.missing(order.from, order.to);
+    if without_spindle == [(order.from, order.to)] {
+        return Err(BridgeError::SilentSpindle {
+            name: order.spindle.clone(),
+            from: words(order.from),
+            to: words(order.to),
+        });
+    }
+    let is_turning_known = length_s(&without_spindle) < order.bin_s;
+    let covered_s = length_s(&covered);
     // What is shorter than one line of a program cannot be seen in it.
     let is_covered = (order.to - order.from).as_secs_f64() - covered_s < order.bin_s;
     let account = reader.account;
@@ -230,11 +260,21 @@ pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, 
     Ok(Shift {
         doubtful: reader.cutter.speeds.doubtful(bin),
         bins: reader.cutter.bins,
-        is_whole: is_covered && leaps.is_empty() && account.is_whole(),
+        is_whole: is_covered && is_turning_known && leaps.is_empty() && account.is_whole(),
+        without_spindle,
+        silent: reader.silent,
         account,
         covered,
         leaps,
     })
+}
+
+/// Length of some spans together, s.
+fn length_s(spans: &[(Stamp<Machine>, Stamp<Machine>)]) -> f64 {
+    let lengths = spans
+        .iter()
+        .map(|(first, last)| (*last - *first).as_secs_f64());
+    lengths.sum()
 }
 
 /// Reads all records; returns the leaps over an instant of the order.

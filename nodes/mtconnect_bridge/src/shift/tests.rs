@@ -51,6 +51,34 @@ fn eq1_eq2_a_log_becomes_mean_speeds_and_travels() {
     assert!(travel[1..].iter().all(|travel_mm| *travel_mm == 0.0));
 }
 
+/// By hand: no speed from 20 s on, where the log says that it is unavailable.
+#[test]
+fn a_time_without_a_speed_is_named_and_none_at_all_is_refused() {
+    let told = |lines: &[&str]| bins(lines.join("\n").as_bytes(), &mapping(), &order());
+    let shift = told(&LOG).unwrap();
+    let spans: Vec<_> = shift
+        .without_spindle
+        .iter()
+        .map(|(a, b)| (words(*a), words(*b)))
+        .collect();
+    assert_eq!(spans.len(), 1, "{spans:?}");
+    assert!(
+        spans[0].0.contains("10:00:20") && spans[0].1.contains("10:00:30"),
+        "{spans:?}"
+    );
+    assert!(!shift.is_whole);
+    let without: Vec<&str> = LOG
+        .iter()
+        .copied()
+        .filter(|line| !line.contains("Srpm"))
+        .collect();
+    let refused = told(&without).unwrap_err().to_string();
+    assert!(
+        refused.contains("spindle \"spindle\": the log has no speed of it"),
+        "{refused}"
+    );
+}
+
 #[test]
 fn eq3_a_program_goes_the_travel_within_its_window_and_lasts_the_time() {
     let bins = bins(LOG.join("\n").as_bytes(), &mapping(), &order())
@@ -140,7 +168,10 @@ fn missing(log: &str) -> (bool, Vec<String>, usize) {
 #[test]
 fn a_log_that_has_a_part_of_the_shift_alone_says_which() {
     let whole = "2016-11-29T10:00:00Z 2016-11-29T10:00:22Z".to_owned();
-    assert_eq!(missing(&LOG.join("\n")), (true, vec![whole], 0));
+    let stands = LOG.join("\n").replace("Srpm|UNAVAILABLE", "Srpm|0");
+    assert_eq!(missing(&stands), (true, vec![whole.clone()], 0));
+    // How fast it turned nobody knows for the last 10 s.
+    assert_eq!(missing(&LOG.join("\n")), (false, vec![whole], 0));
     // It ends early.
     let part = "2016-11-29T10:00:00Z 2016-11-29T10:00:06Z".to_owned();
     assert_eq!(missing(&LOG[..4].join("\n")), (false, vec![part], 0));

@@ -182,6 +182,21 @@ fn an_agent_that_refuses_a_number_since_it_counts_anew_is_reported() {
     assert_eq!(talk.asked().last(), Some(&"/sample?from=4"));
 }
 
+/// An agent that calls every number out of range tells nothing: its machine would look as if it stood.
+#[test]
+fn an_agent_that_refuses_every_number_is_reported() {
+    let mut talk = Talk::begun();
+    for _ in 0..3 {
+        let body = OUT_OF_RANGE.as_bytes().to_vec();
+        talk.step(Input::Io(IoEvent::Answered { status: 404, body }));
+        talk.wait(1);
+        talk.whole(&document(7, 1, 10, &[(9, "READY")]));
+    }
+    let conditions = talk.conditions();
+    let refused = conditions.iter().filter(|one| one.contains("OUT_OF_RANGE"));
+    assert_eq!(refused.count(), 1, "{conditions:?}");
+}
+
 #[test]
 fn one_number_near_the_greatest_silences_no_part_behind_it() {
     for wrong in [1_000_000, u64::MAX - 1, u64::MAX] {

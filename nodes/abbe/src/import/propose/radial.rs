@@ -40,7 +40,10 @@ pub fn columns(found: &Recognised) -> Result<(&Known, Option<(&Known, f64)>)> {
         says(column, &["radius"]) && !says(column, &["radial", "dev", "abw", "err"])
     };
     let radii = || found.all(Role::Radial).filter(is_radius);
-    let read = found.all(Role::Radial).find(|column| !is_radius(column));
+    let read = found
+        .first(Role::Radial)
+        .filter(|column| !is_radius(column));
+    let read = read.or_else(|| found.all(Role::Radial).find(|column| !is_radius(column)));
     let Some(read) = read.or_else(|| found.first(Role::Deviation)) else {
         let read = radii().next().context("no column of radial deviations")?;
         let unit = read.unit.filter(|unit| unit.kind() == Kind::Length);

@@ -277,7 +277,7 @@ fn refusals_name_the_offset_and_what_to_do() {
     assert_eq!(
         shop.run(text).1,
         "line 1, column 1: (frame: machine): the offset X3 C-2.5 by G92 or G52 is in effect; clear it by G92.1, or by \
-         G52 X0 Y0 Z0"
+         G52 X0 C0"
     );
     shop.run("G92.1\nM2");
     assert_eq!(shop.run(text).0, Outcome::Done);

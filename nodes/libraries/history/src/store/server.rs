@@ -8,11 +8,12 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use postgres_openssl::MakeTlsConnector;
 use tokio::runtime::Runtime;
 use tokio::time::{sleep, timeout};
 use tokio_postgres::error::SqlState;
 use tokio_postgres::types::{ToSql, Type};
-use tokio_postgres::{Client, Config, NoTls};
+use tokio_postgres::{Client, Config};
 
 use super::cells::Fault;
 use super::row::{Key, TableRow};
@@ -22,7 +23,11 @@ use crate::error::HistoryError;
 use crate::schema;
 
 mod adding;
+mod parameters;
 mod row;
+mod tls;
+
+use parameters::TlsParameters;
 
 /// First pause between two attempts; each further one is twice as long, up to [`LONGEST_PAUSE`].
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
@@ -35,9 +40,15 @@ const LOCK: i64 = schema::APPLICATION_ID;
 pub struct Server {
     runtime: Runtime,
     client: Client,
-    config: Config,
+    way: Way,
     shown: PathBuf,
     options: Options,
+}
+
+/// How the server is reached.
+struct Way {
+    config: Config,
+    tls: MakeTlsConnector,
 }
 
 impl std::fmt::Debug for Server {
@@ -59,6 +70,7 @@ impl Server {
             path: shown.to_owned(),
             reason,
         };
+        let (url, parameters) = TlsParameters::split(url, shown)?;
         let mut config: Config = url
             .parse()
             .map_err(|error: tokio_postgres::Error| unopened(in_words(&error)))?;
@@ -69,18 +81,20 @@ impl Server {
             "{given} -c search_path=abbe -c statement_timeout={busy_ms} -c lock_timeout={busy_ms} -c default_transaction_read_only={mode}"
         ));
         config.application_name("abbe");
+        let tls = tls::prepare(&mut config, &parameters, shown)?;
+        let way = Way { config, tls };
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()
             .map_err(|error| unopened(error.to_string()))?;
         let limit = Duration::from_millis(busy_ms.into());
-        let client = within(&runtime, limit, connect(&config))
+        let client = within(&runtime, limit, connect(&way))
             .ok_or_else(|| late(shown, options, "no connection"))?
             .map_err(|error| wrong(shown, options, &error))?;
         let mut server = Self {
             runtime,
             client,
-            config,
+            way,
             shown: shown.to_owned(),
             options,
         };
@@ -122,7 +136,7 @@ impl Server {
     pub fn add(&mut self, entry: &Entry) -> Result<Added, HistoryError> {
         let last = RefCell::new(String::from("no answer"));
         let limit = self.limit();
-        let (client, config) = (&mut self.client, &self.config);
+        let (client, way) = (&mut self.client, &self.way);
         let work = async {
             let mut pause = FIRST_PAUSE;
             // Whether an attempt may have come to its end without an answer.
@@ -139,7 +153,7 @@ impl Server {
                 sleep(pause).await;
                 pause = (pause * 2).min(LONGEST_PAUSE);
                 if client.is_closed() {
-                    *client = connect(config).await?;
+                    *client = connect(way).await?;
                 }
             }
         };
@@ -206,10 +220,10 @@ fn within<T>(runtime: &Runtime, limit: Duration, work: impl Future<Output = T>) 
 }
 
 /// Connects; while the server is away or starts, again and again. The caller has the limit.
-async fn connect(config: &Config) -> Result<Client, tokio_postgres::Error> {
+async fn connect(way: &Way) -> Result<Client, tokio_postgres::Error> {
     let mut pause = FIRST_PAUSE;
     loop {
-        match config.connect(NoTls).await {
+        match way.config.connect(way.tls.clone()).await {
             Ok((client, connection)) => {
                 // It ends with the client; what it reports, the client's questions do too.
                 tokio::spawn(async move {
@@ -280,13 +294,15 @@ fn is_passing(error: &tokio_postgres::Error) -> bool {
     ];
     match error.code() {
         Some(code) => PASSING.contains(code),
-        None => error.is_closed() || is_io(error),
+        None => error.is_closed() || is_broken(error),
     }
 }
 
-fn is_io(error: &tokio_postgres::Error) -> bool {
+/// Whether the link broke: while it was used, or while TLS began.
+fn is_broken(error: &tokio_postgres::Error) -> bool {
     let source = std::error::Error::source(error);
-    source.is_some_and(|source| source.is::<std::io::Error>())
+    source.is_some_and(|it| it.is::<std::io::Error>() || tls::is_of_tls(it))
+        && tls::fault(error).is_none()
 }
 
 /// The server's own words, or those of the connection with their cause.
@@ -313,7 +329,13 @@ fn wrong(path: &Path, options: Options, error: &tokio_postgres::Error) -> Histor
         SqlState::INVALID_AUTHORIZATION_SPECIFICATION,
         SqlState::INVALID_CATALOG_NAME,
     ];
-    let (path, reason) = (path.to_owned(), in_words(error));
+    let path = path.to_owned();
+    match tls::fault(error) {
+        Some(tls::Fault::NotOffered) => return HistoryError::NoTls { path },
+        Some(tls::Fault::Untrusted(reason)) => return HistoryError::Untrusted { path, reason },
+        None => {}
+    }
+    let reason = in_words(error);
     let is_of = |states: &[SqlState]| error.code().is_some_and(|code| states.contains(code));
     if is_of(&REFUSED) {
         HistoryError::Refused { path, reason }

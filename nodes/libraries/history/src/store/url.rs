@@ -26,8 +26,12 @@ pub fn shown(path: &Path) -> PathBuf {
     let Some(url) = of(path) else {
         return path.to_owned();
     };
-    let (url, _) = url.split_once('?').unwrap_or((url, ""));
+    let (url, query) = url.split_once('?').unwrap_or((url, ""));
     let (scheme, rest) = url.split_once("://").unwrap_or(("", url));
+    // A password with a bare `?` ends there: nothing tells it from a host and its port.
+    if query.contains('@') {
+        return PathBuf::from(format!("{scheme}://"));
+    }
     let end = rest.rfind('@').unwrap_or(0);
     let (user, place) = rest.split_at(end);
     let (user, _) = user.split_once(':').unwrap_or((user, ""));
@@ -45,6 +49,7 @@ mod tests {
             ("postgres://a:se@cret@h/d", "postgres://a@h/d"),
             ("postgresql://h/d?password=secret", "postgresql://h/d"),
             ("postgres://a@h/d", "postgres://a@h/d"),
+            ("postgres://a:sec?ret@h/d", "postgres://"),
             ("/var/history.sqlite", "/var/history.sqlite"),
         ] {
             assert_eq!(shown(Path::new(url)), Path::new(wanted));

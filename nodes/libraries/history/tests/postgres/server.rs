@@ -1,13 +1,16 @@
 //! A PostgreSQL server of a test's own, on loopback in a temporary folder, and never as root.
 
+use std::fs::Permissions;
 use std::net::TcpListener;
-use std::os::unix::fs::chown;
+use std::os::unix::fs::{PermissionsExt, chown};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
+
+use crate::authority::Signed;
 
 /// How long a server may take to start.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -59,6 +62,42 @@ impl Server {
         assert!(made.status.success(), "{made:?}");
         server.run();
         Some(server)
+    }
+
+    /// The port on loopback.
+    pub const fn port(&self) -> u16 {
+        self.port
+    }
+
+    /// The folder of its local socket.
+    pub fn socket_folder(&self) -> &Path {
+        self.home.path()
+    }
+
+    /// Starts it anew with a certificate and the authority of its clients, or without TLS, and with these rights.
+    pub fn secure(&mut self, tls: Option<(&Signed, &Path)>, rights: &str) {
+        let mut settings = "ssl = off\n".to_owned();
+        if let Some((signed, authority)) = tls {
+            let files = [&signed.certificate, &signed.key, authority];
+            for (file, name) in files.iter().zip(["server.crt", "server.key", "ca.crt"]) {
+                self.place(name, &std::fs::read(file).unwrap());
+            }
+            settings = "ssl = on\nssl_ca_file = 'ca.crt'\n".to_owned();
+        }
+        self.place("pg_hba.conf", rights.as_bytes());
+        self.place("postgresql.auto.conf", settings.as_bytes());
+        self.kill();
+        self.run();
+    }
+
+    /// A file of the server that nobody else can read.
+    fn place(&self, name: &str, content: &[u8]) {
+        let file = self.data().join(name);
+        std::fs::write(&file, content).unwrap();
+        std::fs::set_permissions(&file, Permissions::from_mode(0o600)).unwrap();
+        if nix::unistd::Uid::effective().is_root() {
+            chown(&file, Some(NOBODY), Some(NOBODY)).unwrap();
+        }
     }
 
     fn data(&self) -> PathBuf {
@@ -136,7 +175,9 @@ impl Server {
         let port = self.port.to_string();
         let done = self
             .command("psql")
-            .args(["-h", "127.0.0.1", "-U", "owner", "-X", "-q", "-A", "-t"])
+            .arg("-h")
+            .arg(self.home.path())
+            .args(["-U", "owner", "-X", "-q", "-A", "-t"])
             .args(["-v", "ON_ERROR_STOP=1", "-p", &port, "-d", database])
             .args(["-c", sql])
             .output()

@@ -10,7 +10,7 @@ use crate::example::{entry, figure};
 use crate::server::Server;
 
 /// Waits long: the tests share few processors.
-const PATIENT: Options = Options {
+pub const PATIENT: Options = Options {
     busy_ms: 120_000,
     most_pages: 4_194_304,
 };

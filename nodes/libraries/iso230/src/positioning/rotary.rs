@@ -20,7 +20,7 @@
 //!
 //! # Holds when
 //! u_D is that of the angle between two positions, as (3) has it once; where a certificate states U of one position, √2 of it
-//! is meant. The reference measures the angle about the axis; its alignment and eccentricity are in its own uncertainty. The number
+//! is meant. A single run has B, E and M alone, as [`super::single_run`]. The reference measures the angle about the axis; its alignment and eccentricity are in its own uncertainty. The number
 //! of targets asked for is that of an axis of at most one turn.
 //!
 //! # Agreement
@@ -36,6 +36,7 @@ use std::f64::consts::{PI, TAU};
 use serde::{Deserialize, Serialize};
 
 use super::budget::PositioningBudget;
+use super::single_run::{self, SingleRunDirection, SingleRunResult};
 use super::{LEAST_RUNS, LEAST_TARGETS, PositioningRuns, RUNS, one_sided};
 use crate::budget::{DeviceUncertainty, Expansion};
 use crate::extent::{
@@ -84,19 +85,22 @@ pub struct RotaryPoint {
     pub direction: Direction,
     /// x̄_i↑ or x̄_i↓, rad.
     pub mean_rad: f64,
-    /// s_i↑ or s_i↓, rad.
-    pub standard_deviation_rad: f64,
+    /// s_i↑ or s_i↓, rad; `None` of a single run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub standard_deviation_rad: Option<f64>,
 }
 
 /// The axis in one direction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RotaryDirection {
-    /// R↑ or R↓.
-    pub repeatability: ExpandedAngle,
+    /// R↑ or R↓; `None` of a single run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeatability: Option<ExpandedAngle>,
     /// E↑ or E↓.
     pub systematic_error: ExpandedAngle,
-    /// A↑ or A↓.
-    pub accuracy: ExpandedAngle,
+    /// A↑ or A↓; `None` of a single run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<ExpandedAngle>,
 }
 
 /// What needs both directions.
@@ -106,14 +110,16 @@ pub struct RotaryBoth {
     pub reversal: ExpandedAngle,
     /// B̄, the mean reversal error with its sign.
     pub mean_reversal: ExpandedAngle,
-    /// R.
-    pub repeatability: ExpandedAngle,
+    /// R; `None` of a single run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeatability: Option<ExpandedAngle>,
     /// E.
     pub systematic_error: ExpandedAngle,
     /// M.
     pub mean_systematic_error: ExpandedAngle,
-    /// A.
-    pub accuracy: ExpandedAngle,
+    /// A; `None` of a single run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<ExpandedAngle>,
 }
 
 /// What a reader of the figures must know about how they came to be.
@@ -161,15 +167,19 @@ pub fn within_half_a_turn_rad(angle_rad: f64) -> f64 {
     if turned <= -PI { PI } else { turned }
 }
 
-/// Evaluates one rotary axis, of both sides or of the one that there is.
+/// Evaluates one rotary axis, of both sides or of the one that there is. A single run has no figure that needs scatter.
 ///
 /// # Errors
-/// No runs, fewer than two runs or targets, targets that do not ascend, lists that do not fit together, a number that is
-/// none, a budget with a negative entry.
+/// No runs, one run of a side beside more of the other, fewer than two targets, targets that do not ascend, lists that do not
+/// fit together, a number that is none, a budget with a negative entry.
 pub fn evaluate(runs: &RotaryRuns, budget: &RotaryBudget) -> Result<RotaryResult, Iso230Error> {
     runs.check()?;
     budget.check()?;
     let (alike, budget) = (runs.alike(), budget.alike());
+    if single_run::is_single(&alike) {
+        let found = single_run::evaluate(&alike, &budget)?;
+        return Ok(of_single(runs, &found));
+    }
     let of = |direction| match alike.in_direction(direction) {
         [] => Ok(None),
         _ => one_sided::evaluate(&alike, direction, &budget).map(Some),
@@ -180,16 +190,16 @@ pub fn evaluate(runs: &RotaryRuns, budget: &RotaryBudget) -> Result<RotaryResult
         _ => None,
     };
     let side = |found: &one_sided::OneSidedResult| RotaryDirection {
-        repeatability: angle(found.result.repeatability),
+        repeatability: Some(angle(found.result.repeatability)),
         systematic_error: angle(found.result.systematic_error),
-        accuracy: angle(found.result.accuracy),
+        accuracy: Some(angle(found.result.accuracy)),
     };
     let points = up.iter().chain(&down).flat_map(|found| {
         found.points.iter().map(|point| RotaryPoint {
             target_rad: point.target_mm,
             direction: found.direction,
             mean_rad: point.side.mean_mm,
-            standard_deviation_rad: point.side.standard_deviation_mm,
+            standard_deviation_rad: Some(point.side.standard_deviation_mm),
         })
     });
     let n_runs = alike.up_mm.len().max(alike.down_mm.len());
@@ -199,15 +209,53 @@ pub fn evaluate(runs: &RotaryRuns, budget: &RotaryBudget) -> Result<RotaryResult
         both: both.map(|found| RotaryBoth {
             reversal: angle(found.reversal),
             mean_reversal: angle(found.mean_reversal),
-            repeatability: angle(found.repeatability),
+            repeatability: Some(angle(found.repeatability)),
             systematic_error: angle(found.systematic_error),
             mean_systematic_error: angle(found.mean_systematic_error),
-            accuracy: angle(found.accuracy),
+            accuracy: Some(angle(found.accuracy)),
         }),
         up: up.as_ref().map(side),
         down: down.as_ref().map(side),
         remarks: remarks(runs, n_runs),
     })
+}
+
+/// The figures of a single run as those of an axis.
+fn of_single(runs: &RotaryRuns, found: &SingleRunResult) -> RotaryResult {
+    let side = |one: SingleRunDirection| RotaryDirection {
+        repeatability: None,
+        systematic_error: angle(one.systematic_error),
+        accuracy: None,
+    };
+    let of = |direction: Direction| {
+        found.points.iter().filter_map(move |point| {
+            let mean_rad = match direction {
+                Direction::Up => point.up_mm,
+                Direction::Down => point.down_mm,
+            };
+            Some(RotaryPoint {
+                target_rad: point.target_mm,
+                direction,
+                mean_rad: mean_rad?,
+                standard_deviation_rad: None,
+            })
+        })
+    };
+    RotaryResult {
+        n_runs: found.n_runs,
+        points: of(Direction::Up).chain(of(Direction::Down)).collect(),
+        up: found.up.map(side),
+        down: found.down.map(side),
+        both: found.both.map(|both| RotaryBoth {
+            reversal: angle(both.reversal),
+            mean_reversal: angle(both.mean_reversal),
+            repeatability: None,
+            systematic_error: angle(both.systematic_error),
+            mean_systematic_error: angle(both.mean_systematic_error),
+            accuracy: None,
+        }),
+        remarks: remarks(runs, found.n_runs),
+    }
 }
 
 /// A figure of (1) to (8) whose numbers were angles.
@@ -251,7 +299,7 @@ impl RotaryRuns {
             });
         }
         for (place, rows) in [("up_rad", &self.up_rad), ("down_rad", &self.down_rad)] {
-            if rows.len() == 1 {
+            if rows.len() == 1 && n_up.max(n_down) > 1 {
                 return Err(Iso230Error::TooFewRuns {
                     place,
                     n: 1,
@@ -356,14 +404,14 @@ mod tests {
         // Means upwards 2 to 6″, downwards 10 to 14″; every s is 1″.
         let (up, both) = (found.up.unwrap(), found.both.unwrap());
         is_arcsec(up.systematic_error, 4.0);
-        is_arcsec(up.repeatability, 4.0);
-        is_arcsec(up.accuracy, 8.0);
+        is_arcsec(up.repeatability.unwrap(), 4.0);
+        is_arcsec(up.accuracy.unwrap(), 8.0);
         is_arcsec(both.reversal, 8.0);
         is_arcsec(both.mean_reversal, -8.0);
         is_arcsec(both.systematic_error, 12.0);
         is_arcsec(both.mean_systematic_error, 4.0);
-        is_arcsec(both.repeatability, 12.0);
-        is_arcsec(both.accuracy, 16.0);
+        is_arcsec(both.repeatability.unwrap(), 12.0);
+        is_arcsec(both.accuracy.unwrap(), 16.0);
         let expanded = both.systematic_error.expanded_uncertainty_rad / ARCSEC;
         assert!((expanded - 0.6).abs() < 1e-12, "{expanded}");
         // 120° ask for 5 targets; 3 runs are fewer than 5.
@@ -380,8 +428,35 @@ mod tests {
     fn one_way_has_its_values_and_none_that_need_the_other() {
         let found = evaluate(&runs(false), &budget()).unwrap();
         assert!(found.down.is_none() && found.both.is_none());
-        is_arcsec(found.up.unwrap().accuracy, 8.0);
+        is_arcsec(found.up.unwrap().accuracy.unwrap(), 8.0);
         assert_eq!(found.points.len(), 5);
+    }
+
+    #[test]
+    fn val_a_single_run_has_by_hand_what_needs_no_scatter() {
+        let mut both_ways = runs(true);
+        both_ways.up_rad.truncate(1);
+        both_ways.down_rad.truncate(1);
+        let found = evaluate(&both_ways, &budget()).unwrap();
+        // 1 to 5″ upwards, 9 to 13″ downwards.
+        let (up, both) = (found.up.unwrap(), found.both.unwrap());
+        is_arcsec(up.systematic_error, 4.0);
+        is_arcsec(both.reversal, 8.0);
+        is_arcsec(both.mean_reversal, -8.0);
+        is_arcsec(both.systematic_error, 12.0);
+        is_arcsec(both.mean_systematic_error, 4.0);
+        assert_eq!(
+            (up.accuracy, both.accuracy, both.repeatability),
+            (None, None, None)
+        );
+        assert_eq!((found.n_runs, found.points.len()), (1, 10));
+        // The certificate is in E as it is of more runs; without a drift B has none.
+        let expanded = both.systematic_error.expanded_uncertainty_rad / ARCSEC;
+        assert!((expanded - 0.6).abs() < 1e-12, "{expanded}");
+        both_ways.down_rad.clear();
+        let found = evaluate(&both_ways, &budget()).unwrap();
+        assert!(found.down.is_none() && found.both.is_none());
+        is_arcsec(found.up.unwrap().systematic_error, 4.0);
     }
 
     #[test]
@@ -401,9 +476,9 @@ mod tests {
     #[test]
     fn what_gives_no_figure_is_refused_with_its_place() {
         let refused = |runs: &RotaryRuns| evaluate(runs, &budget()).unwrap_err().to_string();
-        let mut one_run = runs(false);
-        one_run.up_rad.truncate(1);
-        assert!(refused(&one_run).contains("up_rad: 1 runs"));
+        let mut one_down = runs(true);
+        one_down.down_rad.truncate(1);
+        assert!(refused(&one_down).contains("down_rad: 1 runs"));
         let mut short = runs(true);
         short.down_rad[1].pop();
         assert!(refused(&short).contains("down_rad[1]"));

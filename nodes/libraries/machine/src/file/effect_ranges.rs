@@ -416,6 +416,15 @@ pub const RANGES: &[(&str, &[Row])] = &[
         ],
     ),
     (
+        "thermal_shift",
+        &[
+            ("x_um_per_k", -200.0, 200.0),
+            ("y_um_per_k", -200.0, 200.0),
+            ("z_um_per_k", -200.0, 200.0),
+            ("lag_min", 0.05, 720.0),
+        ],
+    ),
+    (
         "thermometer_lag",
         &[
             ("lag_s", 0.0, 600.0),

@@ -53,7 +53,7 @@ pub enum TrajectoryError {
         acceleration_mm_s2: f64,
     },
     #[error(
-        "overrun_mm = {overrun_mm}: feed {feed_mm_min} mm/min is reached and settled only {needed_mm:.1} mm before the first target", overrun_mm = number(*overrun_mm), feed_mm_min = number(*feed_mm_min))]
+        "overrun_mm = {overrun_mm}: must be at least {needed_mm:.1} mm, for the axis to reach {feed_mm_min} mm/min and settle before the first target", overrun_mm = number(*overrun_mm), feed_mm_min = number(*feed_mm_min))]
     OverrunTooShort {
         overrun_mm: f64,
         needed_mm: f64,

@@ -33,7 +33,7 @@ use crate::environment::Interface;
 /// Where participants announce themselves (RTPS 2.5, 9.6.2.4).
 const GROUP: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
 /// More than any datagram.
-const MAX_DATAGRAM_BYTES: usize = 1 << 16;
+pub(super) const MAX_DATAGRAM_BYTES: usize = 1 << 16;
 
 /// Between two looks: Cyclone DDS is forgotten after 10 s.
 const ABSENCE_PERIOD: Duration = Duration::from_secs(3);
@@ -101,10 +101,10 @@ impl Absent {
     /// Where announcements cannot be listened to.
     pub fn of(participant: &DomainParticipant, interfaces: &[Interface]) -> io::Result<Self> {
         let domain = participant.domain_id();
-        let socket = listen(ports::announcement_port(domain), interfaces)?;
+        let others = interfaces.iter().filter(|of| !of.loopback);
+        let socket = listen(ports::announcement_port(domain), others)?;
         let port = ports::discovery_port(domain, participant.participant_id());
-        let mut own = [0; PREFIX_LEN];
-        own.copy_from_slice(&participant.guid().to_bytes()[..PREFIX_LEN]);
+        let own = prefix_of(participant);
         let keeper = Keeper {
             socket,
             own,
@@ -115,30 +115,40 @@ impl Absent {
     }
 }
 
+/// The participant's own prefix.
+pub(super) fn prefix_of(participant: &DomainParticipant) -> Prefix {
+    let mut own = [0; PREFIX_LEN];
+    own.copy_from_slice(&participant.guid().to_bytes()[..PREFIX_LEN]);
+    own
+}
+
 impl Drop for Absent {
     fn drop(&mut self) {
         self.0.abort();
     }
 }
 
-fn addresses(interfaces: &[Interface]) -> impl Iterator<Item = Ipv4Addr> + '_ {
+/// Of this host.
+pub(super) fn addresses(interfaces: &[Interface]) -> impl Iterator<Item = Ipv4Addr> + '_ {
     interfaces
         .iter()
         .flat_map(|of| of.addresses.iter().copied())
 }
 
-/// A socket beside those of all participants of this host.
-fn listen(port: u16, interfaces: &[Interface]) -> io::Result<UdpSocket> {
+/// A socket beside those of all participants of this host, which hears multicast of these interfaces.
+pub(super) fn listen<'i>(
+    port: u16,
+    interfaces: impl Iterator<Item = &'i Interface>,
+) -> io::Result<UdpSocket> {
     let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
     socket.set_reuse_address(true)?;
     socket.set_nonblocking(true)?;
     socket.bind(&SocketAddr::from((Ipv4Addr::UNSPECIFIED, port)).into())?;
-    let others = interfaces.iter().filter(|of| of.usable && of.multicast);
-    for interface in others.filter(|of| !of.loopback) {
+    for interface in interfaces.filter(|of| of.usable && of.multicast) {
         for address in &interface.addresses {
             // An interface that has gone since is none to listen on.
             if let Err(error) = socket.join_multicast_v4(&GROUP, address) {
-                tracing::debug!(%address, %error, "announcements are not listened to here");
+                tracing::debug!(%address, %error, "multicast is not listened to here");
             }
         }
     }

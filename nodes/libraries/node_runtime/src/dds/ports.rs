@@ -20,6 +20,11 @@ pub(super) const fn announcement_port(domain: u16) -> u16 {
     7400 + 250 * domain
 }
 
+/// The port of a domain where samples for all come to.
+pub(super) const fn common_sample_port(domain: u16) -> u16 {
+    announcement_port(domain) + 1
+}
+
 /// The port for discovery of the `participant`-th participant of a computer, from 0.
 pub(super) const fn discovery_port(domain: u16, participant: u16) -> u16 {
     announcement_port(domain) + 10 + 2 * participant
@@ -100,6 +105,7 @@ mod tests {
         assert_eq!(sample_port(0, 0), 7411);
         assert_eq!(sample_port(42, 3), 7400 + 42 * 250 + 11 + 6);
         assert_eq!(announcement_port(42), 7400 + 42 * 250);
+        assert_eq!(common_sample_port(42), 7400 + 42 * 250 + 1);
         assert_eq!(discovery_port(42, 3), 7400 + 42 * 250 + 10 + 6);
     }
 }

@@ -1,6 +1,6 @@
 //! What is sent past the DDS library, as RTPS 2.5 has it on the wire: a sample in fragments (8.3.8.3, 9.4.5.4), a
-//! reader's request for a writer's first sample (8.3.8.1, 9.4.5.2), and word that a participant is alive (8.3.8.2, 9.4.5.3).
-//! And what is read past it: who announces itself.
+//! reader's request for a writer's first sample (8.3.8.1, 9.4.5.2), word that a participant is alive (8.3.8.2, 9.4.5.3), and
+//! the announcement of one that only listens (8.5.3.2). And what is read past it: who announces itself.
 //!
 //! | part of a fragments' datagram | bytes |
 //! |---|---|
@@ -9,6 +9,8 @@
 //! | `DATA_FRAG`: writer, number, place among the fragments | 36 |
 //! | its inline quality: the request that is answered, under both names that are in use | 60 |
 //! | up to five fragments | 1,280 |
+
+use std::net::SocketAddrV4;
 
 use crate::network::{Guid, RequestIdentity};
 
@@ -32,6 +34,8 @@ const DATA: u8 = 0x15;
 const DATA_FRAG: u8 = 0x16;
 const LITTLE_ENDIAN: u8 = 0x01;
 const INLINE_QOS: u8 = 0x02;
+/// There is a sample.
+const CONTENT: u8 = 0x04;
 /// The sample is a key alone: it ends what it is the key of.
 const KEY: u8 = 0x08;
 /// From behind itself to the payload, of a sample without inline quality.
@@ -39,6 +43,8 @@ const OCTETS_TO_PAYLOAD: u16 = 16;
 /// By whom and for whom participants are announced (9.3.1.2).
 const ANNOUNCER: [u8; 4] = [0, 1, 0, 0xc2];
 const LISTENER: [u8; 4] = [0, 1, 0, 0xc7];
+/// A participant itself, behind its prefix.
+const PARTICIPANT: [u8; 4] = [0, 0, 1, 0xc1];
 /// From behind itself to the inline quality.
 const OCTETS_TO_INLINE_QOS: u16 = 28;
 /// Every reader that is matched with the writer.
@@ -113,13 +119,17 @@ pub(super) enum Announcement {
     Gone(Prefix),
 }
 
+/// Who sends a datagram.
+pub(super) fn sender(datagram: &[u8]) -> Option<Prefix> {
+    let head = datagram.get(..RTPS_HEADER_LEN)?;
+    let prefix = head.last_chunk().copied();
+    prefix.filter(|_| head.starts_with(b"RTPS"))
+}
+
 /// Whom a datagram announces, where it does.
 pub(super) fn announcement(datagram: &[u8]) -> Option<Announcement> {
-    let (head, mut rest) = datagram.split_at_checked(RTPS_HEADER_LEN)?;
-    let prefix = head[RTPS_HEADER_LEN - PREFIX_LEN..].try_into().ok()?;
-    if !head.starts_with(b"RTPS") {
-        return None;
-    }
+    let prefix = sender(datagram)?;
+    let mut rest = datagram.get(RTPS_HEADER_LEN..)?;
     while let Some((&[kind, flags, low, high], body)) = rest.split_first_chunk() {
         let len = if flags & LITTLE_ENDIAN == 0 {
             u16::from_be_bytes([low, high])
@@ -142,6 +152,48 @@ pub(super) fn announcement(datagram: &[u8]) -> Option<Announcement> {
 
 /// The datagram by which `own` tells itself that `other` is alive: an announcement of it that has no content.
 pub(super) fn alive(own: &Prefix, other: &Prefix) -> Vec<u8> {
+    announcing(own, other, 1, &[])
+}
+
+/// The datagram by which `own` tells itself of a participant that listens for announcements at `addresses`, and does
+/// nothing else (8.5.4.2, 9.6.2.2, 9.6.3). `number` counts what was told of it.
+pub(super) fn stand_in(
+    own: &Prefix,
+    other: &Prefix,
+    number: u64,
+    addresses: &[SocketAddrV4],
+) -> Vec<u8> {
+    /// Parameters in the order of the bytes of this computer's network: little-endian.
+    const PARAMETERS: [u8; 4] = [0, 3, 0, 0];
+    /// It listens for announcements of participants.
+    const DETECTOR: u32 = 1 << 1;
+    /// A locator is of UDP over IPv4.
+    const UDP_V4: u32 = 1;
+    /// How long it is believed, s.
+    const LEASE_S: u32 = 60;
+    let mut content = PARAMETERS.to_vec();
+    let mut put = |name: u16, parts: &[&[u8]]| {
+        let len = parts.iter().map(|part| part.len()).sum::<usize>();
+        content.extend(name.to_le_bytes());
+        content.extend(u16::try_from(len).unwrap_or(0).to_le_bytes());
+        content.extend(parts.concat());
+    };
+    put(0x0015, &[&VERSION, &[0, 0]]);
+    put(0x0016, &[&other[..2], &[0, 0]]);
+    put(0x0050, &[other, &PARTICIPANT]);
+    for address in addresses {
+        let port = u32::from(address.port()).to_le_bytes();
+        let ip = address.ip().octets();
+        put(0x0032, &[&UDP_V4.to_le_bytes(), &port, &[0; 12], &ip]);
+    }
+    put(0x0058, &[&DETECTOR.to_le_bytes()]);
+    put(0x0002, &[&LEASE_S.to_le_bytes(), &[0; 4]]);
+    put(SENTINEL, &[]);
+    announcing(own, other, number, &content)
+}
+
+/// An announcement of `other`, told by `own` in its name.
+fn announcing(own: &Prefix, other: &Prefix, number: u64, content: &[u8]) -> Vec<u8> {
     let mut datagram = from(own);
     let begun = begin(&mut datagram, INFO_SRC, LITTLE_ENDIAN);
     datagram.extend([0; 4]);
@@ -149,12 +201,14 @@ pub(super) fn alive(own: &Prefix, other: &Prefix) -> Vec<u8> {
     datagram.extend(&other[..2]);
     datagram.extend(other);
     end(&mut datagram, begun);
-    let begun = begin(&mut datagram, DATA, LITTLE_ENDIAN);
+    let has_content = if content.is_empty() { 0 } else { CONTENT };
+    let begun = begin(&mut datagram, DATA, LITTLE_ENDIAN | has_content);
     datagram.extend([0, 0]);
     datagram.extend(OCTETS_TO_PAYLOAD.to_le_bytes());
     datagram.extend(LISTENER);
     datagram.extend(ANNOUNCER);
-    put_halves(&mut datagram, 1);
+    put_halves(&mut datagram, number);
+    datagram.extend(content);
     end(&mut datagram, begun);
     datagram
 }
@@ -322,5 +376,36 @@ mod tests {
         assert_eq!(datagram[44..52], [0x15, 1, 20, 0, 0, 0, 16, 0]);
         assert_eq!(datagram[52..60], [0, 1, 0, 0xc7, 0, 1, 0, 0xc2]);
         assert_eq!(datagram[60..], [0, 0, 0, 0, 1, 0, 0, 0]);
+    }
+
+    /// Bytes as RTPS 2.5 has them: 9.4.5.4 (DATA), 9.4.2.11 (parameter list), table 9.13 (names of parameters).
+    #[test]
+    fn a_stand_in_is_an_announcement_with_its_addresses() {
+        let addresses = [SocketAddrV4::new([10, 0, 0, 7].into(), 7_410)];
+        let datagram = stand_in(&[7; PREFIX_LEN], &[9; PREFIX_LEN], 3, &addresses);
+        assert_eq!(sender(&datagram), Some([7; PREFIX_LEN]));
+        assert_eq!(datagram[44..46], [0x15, 5]);
+        assert_eq!(number(&datagram[46..48]), datagram.len() - 48);
+        assert_eq!(datagram[60..72], [0, 0, 0, 0, 3, 0, 0, 0, 0, 3, 0, 0]);
+        let mut parameters = vec![];
+        let mut rest = &datagram[72..];
+        while let Some((head, behind)) = rest.split_first_chunk::<4>() {
+            let (name, len) = (number(&head[..2]), number(&head[2..]));
+            parameters.push((name, behind[..len].to_vec()));
+            rest = &behind[len..];
+        }
+        let guid = [[9; 12].as_slice(), &[0, 0, 1, 0xc1]].concat();
+        let port_and_ip = [[0xf2, 0x1c, 0, 0].as_slice(), &[0; 12], &[10, 0, 0, 7]].concat();
+        let locator = [[1, 0, 0, 0].as_slice(), &port_and_ip].concat();
+        let wanted = [
+            (0x15, vec![2, 4, 0, 0]),
+            (0x16, vec![9, 9, 0, 0]),
+            (0x50, guid),
+            (0x32, locator),
+            (0x58, vec![2, 0, 0, 0]),
+            (0x02, vec![60, 0, 0, 0, 0, 0, 0, 0]),
+            (0x01, vec![]),
+        ];
+        assert_eq!(parameters, wanted);
     }
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::HOUR_S;
 use crate::evaluate::budget::MandrelGrowth;
-use crate::positioning::figure;
+use crate::positioning::{figure, with_u};
 use crate::section::um;
 
 /// Hours after which the drift is stated.
@@ -165,8 +165,7 @@ fn rate_cell(rate: ExpandedRate, stated: bool) -> String {
     let um_h = |mm_s: f64| mm_s * HOUR_S * 1e3;
     let value_um_h = um_h(rate.value_mm_s);
     if stated {
-        let expanded_um_h = um_h(rate.expanded_uncertainty_mm_s);
-        format!("{value_um_h:.2} ± {expanded_um_h:.2}")
+        with_u(value_um_h, um_h(rate.expanded_uncertainty_mm_s))
     } else {
         format!("{value_um_h:.2}")
     }
@@ -227,6 +226,11 @@ mod tests {
             expanded_uncertainty_mm_s: 0.25e-3 / HOUR_S,
         };
         assert_eq!(rate_cell(rate, true), "1.00 ± 0.25");
+        let slow = ExpandedRate {
+            value_mm_s: 4e-6 / HOUR_S,
+            expanded_uncertainty_mm_s: 1.2e-6 / HOUR_S,
+        };
+        assert_eq!(rate_cell(slow, true), "0.0040 ± 0.0012");
         assert_eq!(rate_cell(rate, false), "1.00");
     }
 

@@ -241,8 +241,15 @@ fn table(
     }
 }
 
-/// Of the axis of time.
-pub(super) const TIME_LABEL: &str = "time since the first reading / h";
+/// Label of the axis of time, and the seconds of its unit: minutes where all lasted less than an hour.
+pub(super) fn time_axis(longest_s: f64) -> (String, f64) {
+    let (unit, unit_s) = if longest_s < HOUR_S {
+        ("min", 60.0)
+    } else {
+        ("h", HOUR_S)
+    };
+    (format!("time since the first reading / {unit}"), unit_s)
+}
 
 fn drawings(
     log: &DriftLog,
@@ -255,10 +262,11 @@ fn drawings(
         points,
         marks: false,
     };
-    let points = values.iter().map(|(s, mm)| (s / HOUR_S, mm * 1e3));
+    let (time, unit_s) = time_axis(values.last().map_or(0.0, |(s, _)| *s));
+    let points = values.iter().map(|(s, mm)| (s / unit_s, mm * 1e3));
     let mut drawings = vec![Drawing {
         svg: plot::svg(&Plot {
-            x: TIME_LABEL.to_owned(),
+            x: time.clone(),
             y: format!("displacement along {} / µm", log.axis),
             traces: vec![trace(log.axis.letter(), points.collect())],
         })?,
@@ -269,7 +277,7 @@ fn drawings(
         .iter()
         .map(|(sensor, series)| {
             let points = series.between(from, to).iter();
-            let points = points.map(|(at, degc)| ((*at - from).as_secs_f64() / HOUR_S, *degc));
+            let points = points.map(|(at, degc)| ((*at - from).as_secs_f64() / unit_s, *degc));
             trace(sensor, points.collect())
         })
         .filter(|trace| !trace.points.is_empty())
@@ -277,7 +285,7 @@ fn drawings(
     if !traces.is_empty() {
         drawings.push(Drawing {
             svg: plot::svg(&Plot {
-                x: TIME_LABEL.to_owned(),
+                x: time,
                 y: "temperature / °C".to_owned(),
                 traces,
             })?,

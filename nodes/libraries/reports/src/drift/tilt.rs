@@ -12,7 +12,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::figures::{AFTER_H, FIGURE_NAMES, LONGEST_PAUSE_S, rate_window_s, scatter_mm};
-use super::logs::{TIME_LABEL, note_of, reader};
+use super::logs::{note_of, reader, time_axis};
 use super::{HOUR_S, in_words};
 use crate::evaluate::budget::{Budget, unstate};
 use crate::evaluate::drift::{Drift, DriftLog};
@@ -292,11 +292,13 @@ fn drawing(pair: &Pair, turn: Axis) -> Result<Drawing> {
         .map(|(l, h)| sign * (h - l) / (high_mm - low_mm) * 1e6);
     let angles: Vec<f64> = angles.collect();
     let first = angles.first().copied().unwrap_or(0.0);
-    let times_h = pair.times_s().into_iter().map(|s| s / HOUR_S);
-    let points = times_h.zip(angles.iter().map(|angle| angle - first));
+    let times_s = pair.times_s();
+    let (time, unit_s) = time_axis(times_s.last().copied().unwrap_or(0.0));
+    let times = times_s.into_iter().map(|s| s / unit_s);
+    let points = times.zip(angles.iter().map(|angle| angle - first));
     Ok(Drawing {
         svg: plot::svg(&Plot {
-            x: TIME_LABEL.to_owned(),
+            x: time,
             y: format!("tilt about {turn} / µrad"),
             traces: vec![Trace {
                 name: turn.letter().to_owned(),

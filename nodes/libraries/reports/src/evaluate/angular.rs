@@ -9,11 +9,12 @@ use metrology::Axis;
 use metrology::sample::{AngleSample, AxisState, TestKind, TestSegment};
 use metrology::stamp::{Host, Span, Stamp};
 
-use super::linear::targets::{left_out, targets};
+use super::linear::slips::Outlying;
+use super::linear::targets::{Places, left_out, targets};
 use super::linear::{STOP_SETTLE, Visits, axis_of, level};
 
-/// Spacing of the grid on which places are compared, deg.
-const GRID_DEG: f64 = 1e-6;
+/// A command that moves by less rests, deg.
+const SAME_DEG: f64 = 1e-6;
 
 /// Runs of one rotary axis, up and down.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +29,11 @@ pub struct RotaryTest {
     pub up_rad: Vec<Vec<f64>>,
     /// The same towards smaller angles, rad. One of the two is empty where all targets were approached from one side.
     pub down_rad: Vec<Vec<f64>>,
-    /// Places with readings that are no targets, and why.
+    /// That mean: what the zero of the reference and the zero of the axis differ by, without whole turns, rad.
+    pub mean_rad: f64,
+    /// Readings far from the others of their targets.
+    pub outlying: Outlying,
+    /// Places with readings that are no targets, and runs that do not count; each with the reason.
     pub left_out: Vec<String>,
     /// Longest rest of the command; none: nothing rested.
     pub longest_rest: Option<Span>,
@@ -93,7 +98,7 @@ impl RotaryRuns {
             .last()
             .is_some_and(|stop| stop.until == stop.since);
         match run.stops.last_mut() {
-            Some(stop) if (stop.at_rad - at_rad).to_degrees().abs() < GRID_DEG => {
+            Some(stop) if (stop.at_rad - at_rad).to_degrees().abs() < SAME_DEG => {
                 stop.until = state.received_at;
             }
             last => {
@@ -146,29 +151,36 @@ fn test(group: &[Run]) -> Option<RotaryTest> {
     let first = group.first()?;
     let read = || group.iter().flat_map(|run| &run.stops);
     let zero_rad = read().find_map(Stop::deviation_rad);
+    let places = Places::of(read().filter(|stop| stop.is_approach()).map(Stop::at_deg));
     let runs: Vec<Visits> = group
         .iter()
-        .map(|run| visits(run, zero_rad.unwrap_or(0.0)))
+        .map(|run| visits(run, zero_rad.unwrap_or(0.0), &places))
         .collect();
-    let (places, sides) = targets(&runs);
-    let numbers: Vec<u32> = group.iter().map(|run| run.begin.run).collect();
-    let left_out = left_out(&runs, &numbers, (&places, sides), (GRID_DEG, "deg"));
+    let (targets, sides) = targets(&runs);
+    let mut numbers: Vec<u32> = group.iter().map(|run| run.begin.run).collect();
+    let mut left_out = left_out(&runs, &numbers, (&targets, sides), (&places, "deg"));
     let of = |side: usize| {
         if !sides.contains(&side) {
             return vec![];
         }
-        let row = |run: &Visits| places.iter().map(|place| run[place][side][0]).collect();
+        let row = |run: &Visits| targets.iter().map(|place| run[place][side][0]).collect();
         runs.iter().map(row).collect::<Vec<Vec<f64>>>()
     };
     let (mut up_rad, mut down_rad) = (of(0), of(1));
-    level(&mut up_rad, &mut down_rad);
-    let to_rad = |place: &i64| (*place as f64 * GRID_DEG).to_radians();
+    let targets_deg = places.at(&targets);
+    let targets_rad: Vec<f64> = targets_deg.iter().map(|deg| deg.to_radians()).collect();
+    let sides = [&mut up_rad, &mut down_rad];
+    let outlying = Outlying::of(false, &targets_rad, &mut numbers, sides);
+    left_out.extend(outlying.left_out());
+    let mean_rad = zero_rad.unwrap_or(0.0) + level(&mut up_rad, &mut down_rad);
     Some(RotaryTest {
         axis: first.axis,
         first_run: first.begin.run,
-        targets_rad: places.iter().map(to_rad).collect(),
+        targets_rad,
         up_rad,
         down_rad,
+        mean_rad: within_half_a_turn_rad(mean_rad),
+        outlying,
         left_out,
         longest_rest: read().map(|stop| stop.until - stop.since).max(),
         has_readings: zero_rad.is_some(),
@@ -176,6 +188,19 @@ fn test(group: &[Run]) -> Option<RotaryTest> {
 }
 
 impl Stop {
+    fn at_deg(&self) -> f64 {
+        self.at_rad.to_degrees()
+    }
+
+    fn way_deg(&self) -> f64 {
+        (self.at_rad - self.from_rad).to_degrees()
+    }
+
+    /// Whether it was read and come to.
+    fn is_approach(&self) -> bool {
+        self.n > 0 && self.way_deg().abs() > SAME_DEG
+    }
+
     /// Mean reading minus command, by whole turns anything, rad.
     fn deviation_rad(&self) -> Option<f64> {
         let mean_rad = self.first_rad + self.sum_rad / f64::from(self.n.max(1));
@@ -183,16 +208,12 @@ impl Stop {
     }
 }
 
-fn visits(run: &Run, zero_rad: f64) -> Visits {
+fn visits(run: &Run, zero_rad: f64, places: &Places) -> Visits {
     let mut visits = Visits::new();
-    for stop in &run.stops {
-        let way_deg = (stop.at_rad - stop.from_rad).to_degrees();
-        if let Some(deviation_rad) = stop.deviation_rad()
-            && way_deg.abs() > GRID_DEG
-        {
-            let place = (stop.at_rad.to_degrees() / GRID_DEG).round() as i64;
-            let [up, down] = visits.entry(place).or_default();
-            let side = if way_deg > 0.0 { up } else { down };
+    for stop in run.stops.iter().filter(|stop| stop.is_approach()) {
+        if let Some(deviation_rad) = stop.deviation_rad() {
+            let [up, down] = visits.entry(places.number(stop.at_deg())).or_default();
+            let side = if stop.way_deg() > 0.0 { up } else { down };
             side.push(within_half_a_turn_rad(deviation_rad - zero_rad));
         }
     }

@@ -2,7 +2,8 @@
 //!
 //! A reading counts where its stamp is of the time of the axis states beside it. That of a length or an angle also has to be
 //! of its run's axis, and a length near its nominal place. Everything else, and every run without a begin or an end, is
-//! counted as left out.
+//! counted as left out. So is a reading of another zero or plane than its run's, and a run whose begin no test of its kind has
+//! or whose end states otherwise than its begin.
 //!
 //! A tracker may read further axes than the run's. Their readings are not needed where one of the run's own axis was made
 //! within [`BESIDE_S`], unless their value is at home on the run's axis and not on the one that they name; otherwise they
@@ -10,17 +11,18 @@
 
 use std::fmt;
 
-use abbe_msgs::topics;
-use metrology::number::number;
-use metrology::sample::{
-    AngleSample, AxisState, FARTHEST_FROM_NOMINAL, GridSample, LATE_S, LengthSample, TestKind,
-    TestSegment,
-};
+use metrology::PerAxis;
+use metrology::sample::{AngleSample, AxisState, GridSample, LengthSample, TestSegment};
 use metrology::stamp::{Host, Stamp};
-use metrology::{Axis, PerAxis};
 use replayer::{Account, Place, Reason, Taken};
 
 use super::linear::axis_of;
+use super::not_evaluated::{Measured, NotEvaluated};
+
+mod begin;
+mod judge;
+
+use begin::{contradiction, wrong_begin};
 
 /// Readings of two axes within this time are of one measurement, s.
 const BESIDE_S: f64 = 1.0;
@@ -63,6 +65,22 @@ pub(super) struct Belonging {
     /// What was taken and nobody needed after all.
     released: Vec<Held>,
     broken_off: Vec<BrokenOff>,
+    not_evaluated: Vec<NotEvaluated>,
+    measured: Vec<Measured>,
+    /// The run whose begin was left out, until its end.
+    refused: Option<u32>,
+    /// Whether the bag has readings of a grid encoder: lengths beside them are no ballbar's.
+    has_grid: bool,
+}
+
+/// What became of the runs of a bag.
+#[derive(Debug, Default)]
+pub(super) struct Runs {
+    pub broken_off: Vec<BrokenOff>,
+    /// Runs whose begin or end cannot be used.
+    pub not_evaluated: Vec<NotEvaluated>,
+    /// Runs of which something was read to their end.
+    pub measured: Vec<Measured>,
 }
 
 /// What becomes of a reading.
@@ -147,29 +165,34 @@ impl Held {
 }
 
 impl Belonging {
-    /// Takes begin or end of a run; returns whether it is the first copy of that message.
-    pub(super) fn segment(&mut self, segment: &TestSegment, taken: &mut Taken<'_>) -> bool {
+    /// For a bag with readings of a grid encoder, or without.
+    pub(super) fn of(has_grid: bool) -> Self {
+        Self {
+            has_grid,
+            ..Self::default()
+        }
+    }
+
+    /// Takes begin or end of a run; returns what it is for those who collect: nothing of a copy or of a begin that cannot be
+    /// used, and the end of a run that contradicts its begin as one that was not completed.
+    pub(super) fn segment(
+        &mut self,
+        segment: TestSegment,
+        taken: &mut Taken<'_>,
+    ) -> Option<TestSegment> {
         if segment.begin {
-            let is_known = self.open.as_ref().is_some_and(|it| it.begin == *segment);
-            if !is_known {
-                self.cut();
-                self.open = Some(Open {
-                    begin: segment.clone(),
-                    begin_message: Held::one(taken),
-                    axes: None,
-                    held: Vec::new(),
-                    last: [None; 3],
-                    own: None,
-                    further: Vec::new(),
-                });
-            }
-            return !is_known;
+            return self.begin(segment, taken);
         }
-        if self.open.is_none() && self.ended.as_ref() == Some(segment) {
-            return false;
+        if self.open.is_none() && self.ended.as_ref() == Some(&segment) {
+            return None;
         }
+        if self.open.is_none() && self.refused.take_if(|run| *run == segment.run).is_some() {
+            taken.release();
+            return None;
+        }
+        self.ended = Some(segment.clone());
         match self.open.take() {
-            Some(open) if open.begin.run == segment.run => self.end(open, segment.completed),
+            Some(open) if open.begin.run == segment.run => Some(self.end(open, segment)),
             other => {
                 self.open = other;
                 self.cut();
@@ -179,10 +202,38 @@ impl Belonging {
                         segment.run
                     )
                 });
+                Some(segment)
             }
         }
-        self.ended = Some(segment.clone());
-        true
+    }
+
+    fn begin(&mut self, segment: TestSegment, taken: &mut Taken<'_>) -> Option<TestSegment> {
+        if self.open.as_ref().is_some_and(|it| it.begin == segment) {
+            return None;
+        }
+        self.cut();
+        let open = Open {
+            begin: segment.clone(),
+            begin_message: Held::one(taken),
+            axes: None,
+            held: Vec::new(),
+            last: [None; 3],
+            own: None,
+            further: Vec::new(),
+        };
+        let Some(reason) = wrong_begin(&segment) else {
+            self.open = Some(open);
+            return Some(segment);
+        };
+        let run = segment.run;
+        taken.leave_out(Reason::OutOfRange, || {
+            format!("{reason}: run {run} is not evaluated")
+        });
+        if let Some(test) = open.evaluated() {
+            self.not_evaluated.push(NotEvaluated { run, test, reason });
+        }
+        self.refused = Some(run);
+        None
     }
 
     /// Positions at one tick.
@@ -198,27 +249,58 @@ impl Belonging {
         }
     }
 
-    /// The run under way has ended.
-    fn end(&mut self, mut open: Open, is_completed: bool) {
+    /// The run under way has ended; returns its end.
+    fn end(&mut self, mut open: Open, end: TestSegment) -> TestSegment {
         let further = std::mem::take(&mut open.further);
-        if !is_completed && let Some(test) = open.evaluated() {
-            let run = open.begin.run;
+        let test = open.evaluated();
+        let run = open.begin.run;
+        if !end.completed
+            && let Some(test) = test
+        {
             self.broken_off.push(BrokenOff { run, test });
             let further = further.into_iter().map(|further| further.held);
             let held = open.held.into_iter().chain(further);
             held.for_each(|held| self.release(held));
-            return;
+            return end;
         }
         for further in further {
             self.leave_out(further.held, Reason::OtherAxis, further.what);
         }
+        let Some(test) = test else {
+            return end;
+        };
+        if let Some(reason) = contradiction(&open.begin, &end) {
+            self.contradicts(open, &reason);
+            self.not_evaluated.push(NotEvaluated { run, test, reason });
+            return TestSegment {
+                completed: false,
+                ..end
+            };
+        }
+        if open.is_read() {
+            let begin = open.begin.clone();
+            self.measured.push(Measured { begin, test });
+        }
         self.dropped.extend(open.without_places());
+        end
+    }
+
+    /// Begin and end of a run contradict each other: what was taken for it cannot be used.
+    fn contradicts(&mut self, open: Open, reason: &str) {
+        let what = format!("{reason}: run {} is not evaluated", open.begin.run);
+        let all = std::iter::once(open.begin_message).chain(open.held);
+        self.dropped.extend(all.map(|held| Dropped {
+            held,
+            reason: Reason::Contradiction,
+            what: what.clone(),
+        }));
     }
 
     /// One reading of the length reference; whether it counts.
     pub(super) fn length(&mut self, sample: &LengthSample, taken: &mut Taken<'_>) -> bool {
-        let open = self.open.as_ref();
-        let judged = open.map(|open| open.judge_length(sample, taken.log_time_nanos()));
+        let (open, has_grid) = (self.open.as_ref(), self.has_grid);
+        let judge = |open: &Open| open.judge_length(sample, (taken.log_time_nanos(), has_grid));
+        let judged = open.map(judge);
         self.take(judged, (Of::Length, sample.at), taken)
     }
 
@@ -234,7 +316,7 @@ impl Belonging {
     pub(super) fn grid(&mut self, sample: &GridSample, taken: &mut Taken<'_>) -> bool {
         let log_time_nanos = taken.log_time_nanos();
         let open = self.open.as_ref();
-        let judged = open.map(|open| open.judge_time(Of::Grid, sample.at, log_time_nanos));
+        let judged = open.map(|open| open.judge_grid(sample, log_time_nanos));
         self.take(judged, (Of::Grid, sample.at), taken)
     }
 
@@ -351,8 +433,8 @@ impl Belonging {
         }));
     }
 
-    /// Counts what was taken and cannot be used, or is not needed, after all; gives the runs that were not completed.
-    pub(super) fn finish(mut self, account: &mut Account) -> Vec<BrokenOff> {
+    /// Counts what was taken and cannot be used, or is not needed, after all; gives what became of the runs.
+    pub(super) fn finish(mut self, account: &mut Account) -> Runs {
         self.cut();
         for held in self.released {
             let mut rows = account.topics.iter_mut();
@@ -369,176 +451,17 @@ impl Belonging {
                 row.take_back(reason, held.messages, held.first, || what);
             }
         }
-        self.broken_off
+        Runs {
+            broken_off: self.broken_off,
+            not_evaluated: self.not_evaluated,
+            measured: self.measured,
+        }
     }
 }
 
 /// Whether two readings are of one measurement.
 fn is_beside(a: Stamp<Host>, b: Stamp<Host>) -> bool {
     (a - b).as_secs_f64().abs() <= BESIDE_S
-}
-
-impl Open {
-    fn judge_length(&self, sample: &LengthSample, log_time_nanos: u64) -> Judged {
-        let of = (Of::Length, sample.axis);
-        let judged = self.judge(of, sample.displacement_mm, sample.at, log_time_nanos);
-        let off_mm = self.off_nominal_mm(sample);
-        let is_beyond = off_mm > FARTHEST_FROM_NOMINAL;
-        if judged != Judged::Counts || !is_beyond {
-            return judged;
-        }
-        let what = format!(
-            "displacement_m: {} mm in run {} is {} mm from its nominal place: at most {FARTHEST_FROM_NOMINAL} mm; a length is in metres",
-            number(sample.displacement_mm),
-            self.begin.run,
-            number(off_mm)
-        );
-        Judged::LeftOut(Reason::Beyond, what)
-    }
-
-    /// Whether a reading of an axis at an instant counts, a length or an angle. A positioning run has one axis; angles
-    /// during a run along a linear axis are nobody's, and lengths during one about a rotary axis.
-    fn judge(
-        &self,
-        (kind, of): (Of, Axis),
-        value: f64,
-        at: Stamp<Host>,
-        log_time_nanos: u64,
-    ) -> Judged {
-        let judged = self.judge_time(kind, at, log_time_nanos);
-        let is_positioning = self.begin.kind == TestKind::Positioning;
-        let axis = axis_of(&self.begin).filter(|_| is_positioning);
-        let measured = axis.filter(|axis| axis.is_linear() == matches!(kind, Of::Length));
-        let Some(axis) = measured.filter(|axis| *axis != of) else {
-            return judged;
-        };
-        let run = self.begin.run;
-        let what = format!("axis: {of} in run {run}, which is along or about {axis}");
-        if self.is_at_home(axis, of, value) {
-            return Judged::LeftOut(Reason::OtherAxis, what);
-        }
-        match judged {
-            Judged::Counts => Judged::Further(format!(
-                "{what}, and no reading of {axis} stands within {BESIDE_S} s of it"
-            )),
-            other => other,
-        }
-    }
-
-    /// Whether a reading is of the time of the run.
-    fn judge_time(&self, kind: Of, at: Stamp<Host>, log_time_nanos: u64) -> Judged {
-        let last = self.last[kind as usize];
-        let Some(off_s) = self.off_s(at, last, log_time_nanos) else {
-            return Judged::Counts;
-        };
-        let what = format!(
-            "its stamp is {} s off the axis states of run {}: at most {LATE_S} s; the clocks of both must be one: synchronise them",
-            number(off_s),
-            self.begin.run
-        );
-        Judged::LeftOut(Reason::OtherTime, what)
-    }
-
-    /// Whether a value is at home on the run's axis and not on the one that it names.
-    fn is_at_home(&self, axis: Axis, named: Axis, value: f64) -> bool {
-        let Some(axes) = &self.axes else {
-            return false;
-        };
-        let off = |axis: Axis| {
-            let (place, way) = (axes.place[axis], axes.place[axis] - axes.first[axis]);
-            (value - place).abs().min((value - way).abs())
-        };
-        let near = NEAR_NOMINAL[usize::from(!axis.is_linear())];
-        off(axis) <= near && off(named) > near
-    }
-
-    /// Which test of the report it would have been; none: the report evaluates no such run as a whole.
-    fn evaluated(&self) -> Option<String> {
-        let begin = &self.begin;
-        let has = |name: &str| self.held.iter().any(|held| held.topic.ends_with(name));
-        let what = begin.features.join(" ");
-        let plane = format!("{:?}", begin.plane).to_uppercase();
-        match begin.kind {
-            TestKind::Circle => Some(format!(
-                "circle in {plane} of radius {} mm",
-                number(begin.radius_mm)
-            )),
-            TestKind::Positioning => Some(format!("positioning along or about {what}")),
-            TestKind::Diagonal => Some(format!("diagonal {what}")),
-            TestKind::Verification => Some(format!("verification {what}")),
-            TestKind::Dwell if has(topics::LENGTH_POSITION.name) => {
-                Some(format!("displacement at rest, {what}"))
-            }
-            _ => None,
-        }
-    }
-
-    /// How far a stamp is off those of the axis states, s, where that is more than a message may be late. States may come
-    /// seldom: then the stamp may be ahead by as much as its message was recorded later, or follow one that was of the
-    /// run's time. Before the first state a stamp is only held against the begin.
-    fn off_s(
-        &self,
-        at: Stamp<Host>,
-        last: Option<Stamp<Host>>,
-        log_time_nanos: u64,
-    ) -> Option<f64> {
-        let Some(axes) = &self.axes else {
-            let off_s = (at - self.begin.at).as_secs_f64();
-            return (off_s < -LATE_S).then_some(off_s);
-        };
-        let off_s = (at - axes.at).as_secs_f64();
-        let later_ns = i128::from(log_time_nanos) - i128::from(axes.log_time_nanos);
-        let later_s = later_ns as f64 / 1e9;
-        let follows = last.is_some_and(|last| (at - last).as_secs_f64().abs() <= LATE_S);
-        let is_off = off_s.abs() > LATE_S && (off_s - later_s).abs() > LATE_S && !follows;
-        is_off.then_some(off_s)
-    }
-
-    /// How far a reading is at least from where it should be, mm. It counts from the machine's zero, or from where the run
-    /// began; along a slanting beam the whole way counts.
-    fn off_nominal_mm(&self, sample: &LengthSample) -> f64 {
-        let (read_mm, axis) = (sample.displacement_mm, sample.axis);
-        let Some(axes) = &self.axes else {
-            return read_mm.abs();
-        };
-        let way_mm = (axes.place.xyz() - axes.first.xyz()).norm();
-        let nominals_mm = [
-            (read_mm - axes.place[axis]).abs(),
-            (read_mm - (axes.place[axis] - axes.first[axis])).abs(),
-            (read_mm.abs() - way_mm).abs(),
-            (read_mm - self.begin.radius_mm).abs(),
-        ];
-        nominals_mm.into_iter().fold(f64::INFINITY, f64::min)
-    }
-
-    /// Readings of a run that ended, where it needs the places of the axes and none came.
-    fn without_places(self) -> Vec<Dropped> {
-        let needs_places = matches!(
-            self.begin.kind,
-            TestKind::Positioning | TestKind::Diagonal | TestKind::Circle
-        );
-        if !needs_places || self.axes.is_some() {
-            return Vec::new();
-        }
-        let readings = [
-            topics::LENGTH_POSITION.name,
-            topics::ANGLE_POSITION.name,
-            topics::GRID_POSITION.name,
-        ];
-        let what = format!(
-            "in run {} no {} came, so it is not known where it was read: record that topic too",
-            self.begin.run,
-            topics::AXES_STATE.name
-        );
-        let held = self.held.into_iter();
-        held.filter(|it| readings.iter().any(|name| it.topic.ends_with(name)))
-            .map(|held| Dropped {
-                held,
-                reason: Reason::NoPlace,
-                what: what.clone(),
-            })
-            .collect()
-    }
 }
 
 #[cfg(test)]

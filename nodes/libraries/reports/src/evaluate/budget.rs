@@ -1,11 +1,13 @@
 //! What is stated about the measurements of a bag: `budget.yaml`, in the units of data sheets.
 //!
-//! Nothing uncertain in it has a default: a term that is left out would be an uncertainty of zero. Temperatures may be
-//! stated or read from thermometers of the bag; without them lengths are not corrected to 20 °C.
+//! Nothing uncertain in it has a default: a term that is left out would be an uncertainty of zero. What the tests of a bag do
+//! not use may be absent; [`Budget::check_tests`] names what they lack. Temperatures may be stated or read from thermometers of
+//! the bag; without them lengths are not corrected to 20 °C.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use abbe_msgs::topics;
 use anyhow::{Context, Result, anyhow};
 use iso230::budget::{DeviceUncertainty, Expansion};
 use iso230::circular::CircularBudget;
@@ -21,7 +23,9 @@ use serde_json::Value;
 
 mod ballbar;
 mod mandrel;
+mod needs;
 mod nothing;
+mod numbers;
 mod screw;
 mod statement;
 #[cfg(test)]
@@ -30,6 +34,7 @@ mod tests;
 use super::test_conditions::{Readings, Thermometers};
 pub use ballbar::Ballbar;
 pub use mandrel::{Mandrel, MandrelGrowth};
+use nothing::{NO_BODY, NO_DEVICE};
 pub use statement::{Instrument, Instruments, NOT_STATED};
 
 /// Figures that had no budget to be computed from have no expanded uncertainty, not one of zero.
@@ -137,30 +142,36 @@ struct Angular {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Budget {
-    /// Plate and head, for circles.
-    grid_encoder: Device,
-    /// Interferometer, tracker or step gauge, or the scales where they measured.
-    length_reference: Device,
+    /// Plate and head; circles by them need it.
+    #[serde(default)]
+    grid_encoder: Option<Device>,
+    /// Interferometer, tracker or step gauge; tests of positioning, diagonals and logs by them need it.
+    #[serde(default)]
+    length_reference: Option<Device>,
     /// Ballbar, for circles; where absent, what it read has no uncertainty.
     #[serde(default)]
     ballbar: Option<Ballbar>,
-    /// The machine, or the workpiece that lengths are corrected to.
-    machine: Body,
+    /// The machine, or the workpiece that lengths are corrected to; lengths, circles and artefacts with a certificate need it.
+    #[serde(default)]
+    machine: Option<Body>,
     /// Ball screws of axes: they carry the positions where the motor encoder leads alone, in place of the machine.
     #[serde(default)]
     screws: BTreeMap<Axis, Body>,
-    /// The device's own body; coefficient 0 for an interferometer.
-    device: Body,
+    /// The device's own body, coefficient 0 for an interferometer; lengths need it.
+    #[serde(default)]
+    device: Option<Body>,
     /// The plate of the grid encoder; where absent, radii of its circles are not corrected to 20 °C.
     #[serde(default)]
     plate: Option<Body>,
     /// Expanded uncertainty (k = 2) of the angle between the plate's axes; where absent, U of a squareness lacks it.
     #[serde(default)]
     plate_squareness_urad: Option<f64>,
-    /// By how much beam and axis can part sideways over the measured length.
-    misalignment_mm: f64,
-    /// Range of a reading with the axes at rest, as long as a test takes.
-    environmental_drift_um: f64,
+    /// By how much beam and axis can part sideways over the measured length; lengths need it.
+    #[serde(default)]
+    misalignment_mm: Option<f64>,
+    /// Range of a reading with the axes at rest, as long as a test takes; all but logs and rotary axes need it.
+    #[serde(default)]
+    environmental_drift_um: Option<f64>,
     /// Standard deviation of such readings from one to the next; without it all drift counts as new at every reading.
     #[serde(default)]
     environmental_unrest_um: Option<f64>,
@@ -240,7 +251,9 @@ impl Body {
         for name in &self.thermometers {
             let silent =
                 || format!("names the thermometer {name}, which has no reading during this test");
-            all.push(read.get(name).ok_or_else(silent)?);
+            let readings = read.get(name).ok_or_else(silent)?;
+            check_range(name, readings)?;
+            all.push(readings);
         }
         let n = all.len() as f64;
         let mean = |of: fn(&Readings) -> f64| all.iter().map(|one| of(one)).sum::<f64>() / n;
@@ -305,6 +318,20 @@ impl Body {
     }
 }
 
+/// Refuses a thermometer that reads what no budget may state.
+fn check_range(name: &str, readings: &Readings) -> Result<(), String> {
+    let [low, high] = [-FARTHEST_K, FARTHEST_K].map(|off_k| REFERENCE_DEGC + off_k);
+    let both = [readings.least_degc, readings.greatest_degc];
+    let wrong = both.into_iter().find(|degc| !(low..=high).contains(degc));
+    wrong.map_or(Ok(()), |degc| {
+        Err(format!(
+            "names the thermometer {name}, and {}{name} read {} °C during this test: must be from {low} to {high} °C; is it in K or °F?",
+            topics::TEMPERATURE.base,
+            number(degc),
+        ))
+    })
+}
+
 /// The largest value of a key; none where its unit has no limit.
 fn greatest(key: &str) -> f64 {
     let of_unit = GREATEST.iter().find(|(unit, _)| key.ends_with(unit));
@@ -330,12 +357,10 @@ impl Budget {
         let wrong = |message: &str| anyhow!("budget file {}", yaml::placed(&file, text, message));
         let budget: Self = yaml::read(text).map_err(|error| wrong(&error.to_string()))?;
         let angular = budget.angular_reference.as_ref();
+        let factor_of = |device: Option<Device>| device.map(|device| device.coverage_factor);
         let factors = [
-            ("grid_encoder", Some(budget.grid_encoder.coverage_factor)),
-            (
-                "length_reference",
-                Some(budget.length_reference.coverage_factor),
-            ),
+            ("grid_encoder", factor_of(budget.grid_encoder)),
+            ("length_reference", factor_of(budget.length_reference)),
             ("angular_reference", angular.map(|one| one.coverage_factor)),
         ];
         let of_ballbar = budget.ballbar.iter().flat_map(Ballbar::factors);
@@ -360,10 +385,16 @@ impl Budget {
             }
         }
         let plate = budget.plate.as_ref().map(|plate| ("plate", plate));
-        let bodies = [("machine", &budget.machine), ("device", &budget.device)];
+        let bodies = [
+            ("machine", budget.machine.as_ref()),
+            ("device", budget.device.as_ref()),
+        ];
+        let bodies = bodies
+            .into_iter()
+            .filter_map(|(key, body)| Some((key, body?)));
         let ballbar = budget.ballbar.as_ref().and_then(Ballbar::body);
         let own = ballbar.map(|body| ("ballbar.body", body));
-        for (key, body) in bodies.into_iter().chain(plate).chain(own) {
+        for (key, body) in bodies.chain(plate).chain(own) {
             body.check()
                 .map_err(|(name, rule)| wrong(&format!("{key}.{name}{rule}")))?;
         }
@@ -380,99 +411,6 @@ impl Budget {
         let own = own.map(|(key, text)| (key.to_owned(), text.as_deref()));
         let all = own.into_iter().chain(self.instruments.texts());
         all.filter_map(|(key, text)| Some((key, text?))).collect()
-    }
-
-    /// The numbers of the parts that may be absent.
-    fn numbers_of_parts(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        let angular = self.angular_reference.iter();
-        let angular_unrest = self
-            .angular_reference
-            .and_then(|one| one.environmental_unrest_arcsec);
-        let of_angles = angular.flat_map(|one| {
-            [
-                (
-                    "angular_reference.expanded_uncertainty_arcsec",
-                    one.expanded_uncertainty_arcsec,
-                ),
-                (
-                    "angular_reference.environmental_drift_arcsec",
-                    one.environmental_drift_arcsec,
-                ),
-            ]
-        });
-        let unrest_arcsec =
-            angular_unrest.map(|arcsec| ("angular_reference.environmental_unrest_arcsec", arcsec));
-        let unrest_um = self.environmental_unrest_um;
-        let unrest = unrest_um.map(|um| ("environmental_unrest_um", um));
-        let plate = self.plate.iter();
-        let of_angles = of_angles.chain(unrest_arcsec).chain(unrest);
-        of_angles.chain(plate.flat_map(|plate| {
-            [
-                (
-                    "plate.temperature_half_width_k",
-                    plate.temperature_half_width_k,
-                ),
-                ("plate.expansion_um_per_m_k", plate.expansion_um_per_m_k),
-                (
-                    "plate.expansion_half_width_um_per_m_k",
-                    plate.expansion_half_width_um_per_m_k,
-                ),
-            ]
-        }))
-    }
-
-    fn numbers(&self) -> Vec<(&'static str, f64)> {
-        let Self {
-            grid_encoder: grid,
-            length_reference: length,
-            machine,
-            device,
-            ..
-        } = self;
-        let mut numbers = vec![
-            (
-                "grid_encoder.expanded_uncertainty_um",
-                grid.expanded_uncertainty_um,
-            ),
-            (
-                "grid_encoder.expanded_uncertainty_um_per_m",
-                grid.expanded_uncertainty_um_per_m,
-            ),
-            (
-                "length_reference.expanded_uncertainty_um",
-                length.expanded_uncertainty_um,
-            ),
-            (
-                "length_reference.expanded_uncertainty_um_per_m",
-                length.expanded_uncertainty_um_per_m,
-            ),
-            (
-                "machine.temperature_half_width_k",
-                machine.temperature_half_width_k,
-            ),
-            ("machine.expansion_um_per_m_k", machine.expansion_um_per_m_k),
-            (
-                "machine.expansion_half_width_um_per_m_k",
-                machine.expansion_half_width_um_per_m_k,
-            ),
-            (
-                "device.temperature_half_width_k",
-                device.temperature_half_width_k,
-            ),
-            ("device.expansion_um_per_m_k", device.expansion_um_per_m_k),
-            (
-                "device.expansion_half_width_um_per_m_k",
-                device.expansion_half_width_um_per_m_k,
-            ),
-            ("misalignment_mm", self.misalignment_mm),
-            ("environmental_drift_um", self.environmental_drift_um),
-        ];
-        numbers.extend(self.numbers_of_parts());
-        numbers.extend(self.ballbar.iter().flat_map(Ballbar::numbers));
-        numbers.extend(self.numbers_of_drift_test());
-        let squareness = self.plate_squareness_urad;
-        numbers.extend(squareness.map(|urad| ("plate_squareness_urad", urad)));
-        numbers
     }
 
     /// For rotary axes by ISO 230-2; `None` where the budget says nothing of an angular reference.
@@ -495,11 +433,11 @@ impl Budget {
         device: Option<&BodyTemperature>,
     ) -> PositioningBudget {
         PositioningBudget {
-            device: self.length_reference.inner(),
-            misalignment_mm: self.misalignment_mm,
-            machine: self.machine.at(machine),
-            device_expansion: self.device.at(device),
-            environmental_drift_mm: self.environmental_drift_um * 1e-3,
+            device: self.length_reference.unwrap_or(NO_DEVICE).inner(),
+            misalignment_mm: self.misalignment_mm.unwrap_or(0.0),
+            machine: self.machine_body().at(machine),
+            device_expansion: self.device_body().at(device),
+            environmental_drift_mm: self.drift_mm(),
             environmental_unrest_mm: self.environmental_unrest_um.map(|um| um * 1e-3),
         }
     }
@@ -510,8 +448,8 @@ impl Budget {
     pub fn of_scale(&self, scale: Option<DeviceUncertainty>) -> PositioningBudget {
         let nothing = Self::nothing();
         PositioningBudget {
-            device: scale.unwrap_or(nothing.length_reference.inner()),
-            environmental_drift_mm: self.environmental_drift_um * 1e-3,
+            device: scale.unwrap_or(NO_DEVICE.inner()),
+            environmental_drift_mm: self.drift_mm(),
             environmental_unrest_mm: self.environmental_unrest_um.map(|um| um * 1e-3),
             ..nothing.positioning(None, None)
         }
@@ -519,15 +457,28 @@ impl Budget {
 
     /// The machine, and the device's own body.
     pub fn bodies(&self) -> (&Body, &Body) {
-        (&self.machine, &self.device)
+        (self.machine_body(), self.device_body())
+    }
+
+    fn machine_body(&self) -> &Body {
+        self.machine.as_ref().unwrap_or(&NO_BODY)
+    }
+
+    fn device_body(&self) -> &Body {
+        self.device.as_ref().unwrap_or(&NO_BODY)
+    }
+
+    /// Range of a reading at rest, mm; 0 where no test needs it.
+    fn drift_mm(&self) -> f64 {
+        self.environmental_drift_um.unwrap_or(0.0) * 1e-3
     }
 
     /// Temperatures that are stated and not read, in words: body, °C, half of its interval.
     #[must_use]
     pub fn stated_temperatures(&self) -> Vec<String> {
         let bodies = [
-            ("machine", Some(&self.machine)),
-            ("device", Some(&self.device)),
+            ("machine", self.machine.as_ref()),
+            ("device", self.device.as_ref()),
             ("plate", self.plate.as_ref()),
         ];
         let words = |(name, body): (&str, Option<&Body>)| {
@@ -550,7 +501,7 @@ impl Budget {
     pub fn of_plate(&self) -> Self {
         let mut own = self.clone();
         if let Some(plate) = &self.plate {
-            own.device = plate.clone();
+            own.device = Some(plate.clone());
         }
         own
     }
@@ -564,11 +515,11 @@ impl Budget {
         device: Option<&BodyTemperature>,
     ) -> CircularBudget {
         CircularBudget {
-            displacement: self.grid_encoder.inner(),
+            displacement: self.grid_encoder.unwrap_or(NO_DEVICE).inner(),
             length: None,
-            machine: self.machine.at(machine),
-            device_expansion: self.device.at(device),
-            environmental_drift_mm: self.environmental_drift_um * 1e-3,
+            machine: self.machine_body().at(machine),
+            device_expansion: self.device_body().at(device),
+            environmental_drift_mm: self.drift_mm(),
             environmental_unrest_mm: self.environmental_unrest_um.map(|um| um * 1e-3),
         }
     }
@@ -576,6 +527,7 @@ impl Budget {
     /// Standard uncertainty of a radius as the plate's certificate states it, mm.
     #[must_use]
     pub fn radius_standard_mm(&self, radius_mm: f64) -> f64 {
-        self.grid_encoder.inner().standard_mm(radius_mm)
+        let plate = self.grid_encoder.unwrap_or(NO_DEVICE);
+        plate.inner().standard_mm(radius_mm)
     }
 }

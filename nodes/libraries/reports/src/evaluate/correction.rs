@@ -3,6 +3,7 @@
 use iso230::budget::{DeviceUncertainty, differential_expansion};
 use iso230::circular::CircularBudget;
 use iso230::positioning::budget::PositioningBudget;
+use machine::MachineFile;
 use machine::file::PositionFeedback;
 use metrology::Axis;
 use serde_json::{Value, json};
@@ -102,7 +103,7 @@ impl<'a> About<'a> {
     }
 
     /// The axis whose motor encoder alone led.
-    fn led_by_motor(&self, tests: &Tests) -> Option<Axis> {
+    pub(super) fn led_by_motor(&self, tests: &Tests) -> Option<Axis> {
         let axis = self.axis.filter(|_| !self.is_compensated)?;
         let machine = tests.machine.as_ref();
         let feedback = machine.and_then(|file| file.linear(axis));
@@ -131,6 +132,8 @@ const LEAST_GROWTH_UM: f64 = 0.1;
 
 /// Why no conformance is decided of what the machine read itself.
 pub const BY_OWN_SCALE: &str = "not ISO 230-2: read by the machine's scale";
+/// The same of what the motor encoder read.
+pub const BY_MOTOR: &str = "not ISO 230-2: read by the motor encoder";
 
 impl Measured {
     /// How these lengths were measured.
@@ -145,7 +148,9 @@ impl Measured {
         let nothing = Budget::nothing();
         let used = budget.unwrap_or(&nothing);
         if about.reference == Reference::Scale {
-            let scale = about.axis.and_then(|axis| scale(tests, axis));
+            let scale = about
+                .axis
+                .and_then(|axis| scale(tests.machine.as_ref()?, axis));
             return Self {
                 budget: used.of_scale(scale),
                 is_stated: budget.is_some() && scale.is_some(),
@@ -300,8 +305,8 @@ impl Known {
 }
 
 /// What the machine file states about the scale of an axis.
-fn scale(tests: &Tests, axis: Axis) -> Option<DeviceUncertainty> {
-    let linear = tests.machine.as_ref()?.linear(axis)?;
+pub(crate) fn scale(machine: &MachineFile, axis: Axis) -> Option<DeviceUncertainty> {
+    let linear = machine.linear(axis)?;
     Some(DeviceUncertainty {
         expanded_uncertainty_mm: linear.scale_expanded_uncertainty_um? * 1e-3,
         expanded_uncertainty_per_length: linear.scale_expanded_uncertainty_um_per_m? * 1e-6,

@@ -16,7 +16,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow};
 use iso230::conformance::Policy;
 use metrology::number::number;
 use metrology::yaml;
@@ -27,12 +27,13 @@ use serde_json::Value;
 pub mod alarms;
 mod judged;
 mod limit;
+pub mod of_axis;
 pub mod webhook;
 
 use crate::section::{Rows, Section, head};
 use crate::terminal::Rank;
 pub use judged::CONFORMS;
-use judged::{Figure, Judged};
+use judged::{BEFORE_STANDARD, Figure, Judged};
 use limit::Limit;
 use webhook::Webhook;
 
@@ -115,6 +116,9 @@ impl Limits {
     #[must_use]
     pub fn of_machine(mut self, machine: Option<&str>) -> Self {
         if let Some(own) = machine.and_then(|machine| self.machines.get(machine)) {
+            // A machine's own limit of a figure holds for every axis.
+            self.limits
+                .retain(|name, _| !own.contains_key(of_axis::parted(name).0));
             self.limits
                 .extend(own.iter().map(|(name, limit)| (name.clone(), *limit)));
         }
@@ -138,17 +142,11 @@ impl Limits {
             ..Rows::default()
         };
         for (name, limit) in self.limits.iter().filter(|(name, _)| is_of_tests(name)) {
-            let found: Vec<(&Value, Figure)> = tests
-                .iter()
-                .filter_map(|test| Some((test, Figure::of(test, name)?)))
-                .collect();
-            if found.is_empty() {
-                let known: BTreeSet<String> = tests.iter().flat_map(names).collect();
-                bail!("limits.{name}: no test has such a figure; there are {known:?}");
-            }
+            let found = self.found(name, tests)?;
+            let (name, place) = (of_axis::parted(name).0, name);
             for (test, figure) in found {
                 let judged = Judged::of(figure, *limit, self.rule)
-                    .with_context(|| format!("limits.{name}"))?;
+                    .with_context(|| format!("limits.{place}"))?;
                 let why = no_verdict(test, name).or_else(|| figure.lacks());
                 let deviations = deviations(test, name);
                 let mut row = judged.row((name, title(test)), *limit, why.is_some());
@@ -157,7 +155,7 @@ impl Limits {
                 }
                 table.rows.push(row);
                 if let Some(key) = judged.lacks_lower(name, *limit).filter(|_| why.is_none()) {
-                    one_sided.insert((name.as_str(), key));
+                    one_sided.insert((name, key));
                 }
                 let mut entry = serde_json::json!({ "figure": name, "test": title(test) });
                 if let Some(why) = why {
@@ -183,15 +181,15 @@ impl Limits {
     }
 }
 
-/// Whether a name is that of a figure of a test; a name with an axis is not.
+/// Whether a name is that of a figure of a test.
 fn is_of_tests(name: &str) -> bool {
-    !name.contains(' ') && !OF_HISTORY.iter().any(|begin| name.starts_with(begin))
+    !OF_HISTORY.iter().any(|begin| name.starts_with(begin))
 }
 
 /// Adds the decisions, or the reason why none is made.
 fn conclude(section: &mut Section, table: Rows, verdicts: Vec<Value>) {
     if table.rows.is_empty() {
-        let line = "Nothing is judged: the limits name no figure of a test, only those that a history has.";
+        let line = "Nothing is judged: the limits name no figure of these tests, only those of other axes or of a history.";
         section.warn("Nothing is judged", line.to_owned());
         return;
     }
@@ -218,7 +216,8 @@ fn in_short(rows: &[Vec<String>]) -> String {
             let key = (decision.starts_with(CONFORMS), Reverse(decision.as_str()));
             let of_decision = by_decision.entry(key).or_default();
             let test = test.split(": ").next().unwrap_or(test);
-            of_decision.entry(test).or_default().push(in_words(figure));
+            let figure = figure.split(BEFORE_STANDARD).next().unwrap_or(figure);
+            of_decision.entry(test).or_default().push(figure.to_owned());
         }
     }
     let counts = by_decision.iter().map(|((_, decision), tests)| {
@@ -233,12 +232,6 @@ fn in_short(rows: &[Vec<String>]) -> String {
     });
     let counts: Vec<String> = counts.collect();
     format!("{}. Figures judged: {}.", counts.join("; "), rows.len())
-}
-
-/// The name of a figure without that of its standard: `accuracy` of `iso230_2.accuracy`.
-fn in_words(figure: &str) -> String {
-    let own = figure.split_once('.').map_or(figure, |(_, own)| own);
-    own.replace(['_', '.'], " ")
 }
 
 fn title(test: &Value) -> &str {
@@ -431,10 +424,10 @@ mod tests {
         };
         let x = "Positioning X, run 3 on: not compensated, by the length reference";
         let rows = [
-            row("iso230_2.accuracy", x, "cannot be decided"),
-            row("iso230_2.repeatability", x, "does not conform"),
-            row("iso230_2.up.mean_reversal", x, "does not conform"),
-            row("iso230_2.accuracy", "Y", CONFORMS),
+            row("accuracy, ISO 230-2", x, "cannot be decided"),
+            row("repeatability, ISO 230-2", x, "does not conform"),
+            row("up mean reversal, ISO 230-2", x, "does not conform"),
+            row("accuracy, ISO 230-2", "Y", CONFORMS),
         ];
         assert_eq!(
             in_short(&rows),
@@ -454,9 +447,9 @@ mod tests {
         assert_eq!(
             said,
             [
-                ["iso230_2.accuracy", "X", "conforms"],
-                ["iso230_2.accuracy", "Y", "does not conform"],
-                ["iso230_2.up.accuracy", "X", "cannot be decided"],
+                ["accuracy, ISO 230-2", "X", "conforms"],
+                ["accuracy, ISO 230-2", "Y", "does not conform"],
+                ["up accuracy, ISO 230-2", "X", "cannot be decided"],
             ]
         );
         assert_eq!(

@@ -29,6 +29,12 @@ const KINDS: [TestKind; 6] = [
     TestKind::ArcWithLine,
     TestKind::TwoArcs,
 ];
+
+/// Whether tests of a kind are paths.
+pub(super) fn is_path(kind: TestKind) -> bool {
+    KINDS.contains(&kind)
+}
+
 /// Most readings of a path: ten minutes at 1 kHz.
 const MOST_READINGS: usize = 600_000;
 /// Commands about that of a reading among which its nearest place is sought.
@@ -97,8 +103,8 @@ impl Paths {
     /// Begin or end of a test.
     pub fn segment(&mut self, segment: &TestSegment) {
         if segment.begin {
-            let is_path = KINDS.contains(&segment.kind) && segment.stations == 0;
-            let axes = plane_axes(segment.plane).filter(|_| is_path);
+            let is_wanted = is_path(segment.kind) && segment.stations == 0;
+            let axes = plane_axes(segment.plane).filter(|_| is_wanted);
             self.current = axes.map(|axes| Current {
                 segment: segment.clone(),
                 axes,

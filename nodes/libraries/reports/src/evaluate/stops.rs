@@ -7,10 +7,12 @@ use metrology::Axis;
 use metrology::sample::{AxisState, PositioningTable, TestKind, TestSegment};
 use metrology::stamp::{Host, Span, Stamp};
 
+use super::linear::targets::SAME_PLACE;
+
 /// Rest after which readings count.
 const READING_SETTLE: Span = Span::from_nanos(200_000_000);
-/// Commands closer than this are one place, mm.
-pub const SAME_MM: f64 = 1e-6;
+/// A command that moves by less rests, mm.
+const SAME_MM: f64 = 1e-6;
 /// Readings that a stop needs.
 const LEAST_READINGS: u32 = 10;
 
@@ -23,6 +25,14 @@ pub struct Stop {
     pub deviation_mm: f64,
     /// Whether it was entered from smaller positions.
     pub up: bool,
+}
+
+impl Stop {
+    /// Whether a position is the place of this stop.
+    #[must_use]
+    pub fn is_at(&self, position_mm: f64) -> bool {
+        (self.commanded_mm - position_mm).abs() <= SAME_PLACE
+    }
 }
 
 /// The stops of one verification.
@@ -46,7 +56,7 @@ impl Stops {
     pub fn side(&self, up: bool) -> Vec<Stop> {
         let mut side: Vec<Stop> = self.stops.iter().filter(|s| s.up == up).copied().collect();
         side.sort_by(|a, b| a.commanded_mm.total_cmp(&b.commanded_mm));
-        side.dedup_by(|later, first| (later.commanded_mm - first.commanded_mm).abs() < SAME_MM);
+        side.dedup_by(|later, first| first.is_at(later.commanded_mm));
         side
     }
 
@@ -54,10 +64,9 @@ impl Stops {
     #[must_use]
     pub fn table(&self, step: usize, sign: f64) -> PositioningTable {
         let (up, down) = (self.side(true), self.side(false));
-        let pairs = up.iter().filter_map(|up| {
-            let same = |down: &&Stop| (down.commanded_mm - up.commanded_mm).abs() < SAME_MM;
-            Some((up, down.iter().find(same)?))
-        });
+        let pairs = up
+            .iter()
+            .filter_map(|up| Some((up, down.iter().find(|down| down.is_at(up.commanded_mm))?)));
         let mut table = PositioningTable {
             at: Stamp::from_nanos(0),
             axis: self.axis,
@@ -202,5 +211,34 @@ impl Current {
             compensated: self.compensated,
             stops,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stops_a_few_nanometres_apart_are_one_place() {
+        let stop = |commanded_mm: f64, up: bool| Stop {
+            commanded_mm,
+            deviation_mm: if up { 0.001 } else { -0.001 },
+            up,
+        };
+        let stops = Stops {
+            run: 1,
+            axis: Axis::X,
+            by_scale: true,
+            compensated: false,
+            stops: vec![
+                stop(10.0 - 1.1e-6, true),
+                stop(20.0, true),
+                stop(20.0, false),
+                stop(10.0 + 1.1e-6, false),
+            ],
+        };
+        let table = stops.table(1, 1.0);
+        assert_eq!(table.deviation_up, [0.001, 0.001]);
+        assert_eq!(table.deviation_down, [-0.001, -0.001]);
     }
 }

@@ -3,17 +3,19 @@
 use std::collections::BTreeMap;
 
 use abbe_msgs::topics;
-use metrology::sample::{TemperatureSample, TestKind, TestSegment};
+use metrology::Axis;
+use metrology::sample::{ProbedPoint, TemperatureSample, TestKind, TestSegment};
 use metrology::stamp::{Host, Span, Stamp};
 use recorder::{Bag, Order};
 use replayer::{Taken, reading};
 
 use super::course::Course;
+use super::imported::Imported;
 
 /// Age of the last reading before a test that still counts for it: thermometers are read every few seconds to minutes.
 const LONGEST_AGE: Span = Span::from_nanos(600_000_000_000);
-/// Feeds closer than this are one, mm/s.
-const SAME_FEED_MM_S: f64 = 1e-9;
+/// Feeds closer than this share of the greater one are one: that of a touch is known to 0.2 %.
+const SAME_FEED: f64 = 0.01;
 /// Tests that touch.
 const TOUCHING: [TestKind; 8] = [
     TestKind::Latency,
@@ -91,6 +93,8 @@ impl Readings {
 struct Test {
     run: u32,
     thermometers: Thermometers,
+    /// Positioning tables that were made meanwhile, by the axis of each.
+    tables: Vec<Axis>,
 }
 
 /// The conditions of a bag's tests.
@@ -104,12 +108,14 @@ pub struct TestConditions {
     pub has_length: bool,
     /// Whether a test touched anything.
     pub has_touches: bool,
-    /// Programmed feeds of the tests in their order, each once, mm/s.
+    /// Feeds of the tests in their order, each once, mm/s: those of programs, and those of touches in whole mm/min.
     pub feeds_mm_s: Vec<f64>,
     /// How long programs of production ran before the first measurement, s.
     pub production_before_s: f64,
     /// From the first test to the last one.
     pub thermometers: Thermometers,
+    /// What is stated of a table that was imported; none of a recording.
+    pub imported: Option<Imported>,
     /// Readings of each thermometer over the whole bag, °C.
     pub courses: BTreeMap<String, Course<f64>>,
     tests: Vec<Test>,
@@ -126,8 +132,12 @@ impl TestConditions {
             topics::TEMPERATURE.base,
             topics::GRID_POSITION.name,
             topics::LENGTH_POSITION.name,
+            topics::PROBE_POINT.name,
         ];
-        let mut conditions = Self::default();
+        let mut conditions = Self {
+            imported: Imported::of(bag),
+            ..Self::default()
+        };
         reading::read(bag, Order::LogTime, &wanted, |mut taken| {
             conditions.message(&mut taken);
             if taken.is(&topics::TEST_SEGMENT)
@@ -139,9 +149,15 @@ impl TestConditions {
         conditions
     }
 
-    /// Begin of the first test and end of the last one, ns since 1970.
+    /// Begin of the first test and end of the last one, ns since 1970; of a table without times its stated begin twice.
     #[must_use]
     pub fn nanos(&self) -> Option<(i64, i64)> {
+        if let Some(table) = &self.imported {
+            let begin = table.begin_nanos()?;
+            if table.is_motion_made_up() {
+                return Some((begin, begin));
+            }
+        }
         let (first, last) = self.between?;
         Some((first.nanos(), last.nanos()))
     }
@@ -150,9 +166,31 @@ impl TestConditions {
     pub fn message(&mut self, taken: &mut Taken<'_>) {
         if taken.is_named(topics::TEMPERATURE.base) {
             self.temperature(taken);
-        } else if self.under_way.is_some() {
+        } else if self.is_in_test() {
             self.has_grid |= taken.is(&topics::GRID_POSITION);
             self.has_length |= taken.is(&topics::LENGTH_POSITION);
+            if taken.is(&topics::PROBE_POINT)
+                && let Some(point) = taken.of(&topics::PROBE_POINT)
+            {
+                self.touch(&point);
+            } else if taken.is(&topics::POSITIONING_TABLE)
+                && let Some(table) = taken.of(&topics::POSITIONING_TABLE)
+                && let Some(test) = self.tests.last_mut()
+            {
+                test.tables.push(table.axis);
+            }
+        }
+    }
+
+    /// A touch within a test: the programs of a cycle have several feeds, of which its begin states one.
+    fn touch(&mut self, point: &ProbedPoint) {
+        self.feed((point.feed_mm_s * 60.0).round() / 60.0);
+    }
+
+    fn feed(&mut self, feed_mm_s: f64) {
+        let is_known = |known: &f64| (known - feed_mm_s).abs() < SAME_FEED * known.max(feed_mm_s);
+        if feed_mm_s > 0.0 && feed_mm_s.is_finite() && !self.feeds_mm_s.iter().any(is_known) {
+            self.feeds_mm_s.push(feed_mm_s);
         }
     }
 
@@ -174,11 +212,17 @@ impl TestConditions {
         if self.between.is_some() {
             add(&mut self.thermometers, name, degc);
         }
-        if self.under_way.is_some()
+        if self.is_in_test()
             && let Some(test) = self.tests.last_mut()
         {
             add(&mut test.thermometers, name, degc);
         }
+    }
+
+    /// Whether a test is under way; a program of production is none.
+    fn is_in_test(&self) -> bool {
+        let segment = self.under_way.as_ref();
+        segment.is_some_and(|segment| segment.kind != TestKind::Production)
     }
 
     /// Begin or end of a test.
@@ -216,14 +260,11 @@ impl TestConditions {
         });
         self.between = Some((first, segment.at));
         self.has_touches |= TOUCHING.contains(&segment.kind);
-        let feed_mm_s = segment.feed_mm_s;
-        let is_known = |known: &f64| (known - feed_mm_s).abs() < SAME_FEED_MM_S;
-        if feed_mm_s > 0.0 && !self.feeds_mm_s.iter().any(is_known) {
-            self.feeds_mm_s.push(feed_mm_s);
-        }
+        self.feed(segment.feed_mm_s);
         self.tests.push(Test {
             run: segment.run,
             thermometers,
+            tables: vec![],
         });
         self.under_way = Some(segment.clone());
     }
@@ -245,10 +286,22 @@ impl TestConditions {
         joined
     }
 
+    /// How many positioning tables of an axis were made during tests, by the numbers of their runs.
+    #[must_use]
+    pub fn tables_during(&self, runs: &[u32], axis: Axis) -> usize {
+        let tests = self.tests.iter().filter(|test| runs.contains(&test.run));
+        let tables = tests.flat_map(|test| &test.tables);
+        tables.filter(|of| **of == axis).count()
+    }
+
     /// Takes what thermometers read during a run.
     #[cfg(test)]
-    pub(super) fn thermometers_of_run(&mut self, run: u32, thermometers: Thermometers) {
-        self.tests.push(Test { run, thermometers });
+    pub(crate) fn thermometers_of_run(&mut self, run: u32, thermometers: Thermometers) {
+        self.tests.push(Test {
+            run,
+            thermometers,
+            tables: vec![],
+        });
     }
 }
 
@@ -263,6 +316,10 @@ fn add(thermometers: &mut Thermometers, name: &str, degc: f64) {
 
 #[cfg(test)]
 mod tests {
+    use metrology::sample::{Correction, Rejection};
+    use metrology::{AxisSet, PerAxis};
+    use nalgebra::Vector3;
+
     use super::*;
 
     fn segment(at_s: i64, run: u32, begin: bool, kind: TestKind) -> TestSegment {
@@ -283,6 +340,76 @@ mod tests {
             temperature_degc,
             variance_k2: 0.0,
         }
+    }
+
+    #[test]
+    fn feeds_of_touches_are_among_those_of_the_test() {
+        // As a bag of the scenario five_axis has them: 60 mm/min in the begin of the latency cycle, 120 in the next one.
+        let mut conditions = TestConditions::default();
+        conditions.segment(&segment_at_feed(1, TestKind::Latency, 60.0));
+        for feed_mm_min in [60.0, 119.813, 240.0, 480.188, 120.187, 480.0, f64::NAN] {
+            conditions.touch(&touch(feed_mm_min));
+        }
+        conditions.segment(&segment_at_feed(2, TestKind::Rotary, 120.0));
+        conditions.touch(&touch(120.015));
+        let mm_min: Vec<f64> = { conditions.feeds_mm_s.iter() }
+            .map(|feed| (feed * 60.0 * 1e6).round() / 1e6)
+            .collect();
+        assert_eq!(mm_min, [60.0, 120.0, 240.0, 480.0]);
+    }
+
+    fn segment_at_feed(run: u32, kind: TestKind, feed_mm_min: f64) -> TestSegment {
+        TestSegment {
+            feed_mm_s: feed_mm_min / 60.0,
+            ..segment(0, run, true, kind)
+        }
+    }
+
+    fn touch(feed_mm_min: f64) -> ProbedPoint {
+        ProbedPoint {
+            received_at: Stamp::from_nanos(0),
+            feature_id: "top".to_owned(),
+            axes_at_contact: PerAxis::default(),
+            axes: AxisSet::XYZ,
+            point_in_machine_mm: Vector3::zeros(),
+            point_in_workpiece_mm: Vector3::zeros(),
+            applied_latency_s: 0.0,
+            correction: Correction::None,
+            standard_uncertainty_mm: 0.0,
+            approach: -Vector3::z(),
+            feed_mm_s: feed_mm_min / 60.0,
+            rejection: Rejection::None,
+            sequence: 0,
+        }
+    }
+
+    #[test]
+    fn what_production_between_two_tests_warms_up_is_of_neither() {
+        let mut conditions = TestConditions::default();
+        let mut during = |run, kind, begin_s: i64, degc: [f64; 2]| {
+            conditions.segment(&segment(begin_s, run, true, kind));
+            for (at_s, degc) in [10, 20].into_iter().zip(degc) {
+                conditions.read(&reading(begin_s + at_s, degc));
+            }
+            conditions.segment(&segment(begin_s + 30, run, false, kind));
+        };
+        during(1, TestKind::Positioning, 0, [20.0, 20.2]);
+        during(2, TestKind::Production, 1_000, [26.0, 30.0]);
+        during(3, TestKind::Positioning, 2_000, [24.0, 23.0]);
+        let mean_and_range = |run| {
+            let bed = conditions.during(&[run])["bed"];
+            (bed.mean_degc(), bed.range_k())
+        };
+        let [first, last] = [mean_and_range(1), mean_and_range(3)];
+        assert!(
+            (first.0 - 20.1).abs() < 1e-12 && (first.1 - 0.2).abs() < 1e-12,
+            "{first:?}"
+        );
+        assert!(
+            (last.0 - 23.5).abs() < 1e-12 && (last.1 - 1.0).abs() < 1e-12,
+            "{last:?}"
+        );
+        assert!(conditions.during(&[2]).is_empty());
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use gap_diagnosis::Diagnosis;
+use gap_diagnosis::report::{GapReport, MadeWith};
 use replayer::Reading;
 
 use super::simulated::Simulated;
@@ -11,7 +12,9 @@ use crate::loss;
 pub struct Diagnosed {
     /// What was found.
     pub diagnosis: Diagnosis,
-    /// What was left out, in words.
+    /// What of the runs could not be used, in words.
+    pub omitted: Vec<String>,
+    /// What was left out and is no loss, in words.
     pub remarks: Vec<String>,
     /// What of each bag was read, lost and left out.
     pub readings: Vec<Reading>,
@@ -28,29 +31,36 @@ pub struct Diagnosed {
 impl Diagnosed {
     /// What was lost or left out, in words.
     pub fn losses(&self) -> Vec<String> {
-        loss::lines(&self.readings)
+        let mut lines = loss::lines(&self.readings);
+        lines.extend(self.omitted.iter().cloned());
+        lines
     }
 
-    /// The report as JSON. What was lost or left out is a key of its own, where there is any, and so are defaults in use.
+    /// The report as JSON, with what is known beside the diagnosis: losses, defaults in use, the simulator, what was not considered.
     ///
     /// # Errors
     /// When a number has no place in JSON.
     pub fn json(&self) -> Result<serde_json::Value> {
-        let mut report = serde_json::to_value(&self.diagnosis.report)?;
-        if self.readings.iter().any(|reading| !reading.is_whole()) {
-            report["loss"] = self.readings.iter().map(loss::as_json).collect();
-        }
-        if !self.defaults.is_empty() {
-            report["machine_defaults"] = self.defaults.as_slice().into();
-        }
-        if let Some(simulated) = &self.simulated {
-            report["simulated"] = serde_json::to_value(simulated)?;
-        }
-        if !(self.without.is_empty() && self.ablated.is_empty()) {
-            report["made_with"] = serde_json::json!({
-                "without": self.without, "ablated": self.ablated,
-            });
-        }
-        Ok(report)
+        let is_whole = self.losses().is_empty();
+        let of_runs = (!self.omitted.is_empty())
+            .then(|| serde_json::json!({ "omitted_of_runs": self.omitted }));
+        let is_limited = !(self.without.is_empty() && self.ablated.is_empty());
+        let simulated = self.simulated.as_ref().map(serde_json::to_value);
+        let report = GapReport {
+            loss: if is_whole {
+                vec![]
+            } else {
+                let bags = self.readings.iter().map(loss::as_json);
+                bags.chain(of_runs).collect()
+            },
+            machine_defaults: self.defaults.clone(),
+            simulated: simulated.transpose()?,
+            made_with: is_limited.then(|| MadeWith {
+                without: self.without.clone(),
+                ablated: self.ablated.clone(),
+            }),
+            ..self.diagnosis.report.clone()
+        };
+        Ok(serde_json::to_value(report)?)
     }
 }

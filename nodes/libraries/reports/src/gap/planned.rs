@@ -1,14 +1,19 @@
 //! The page of a forecast: what a programme will be able to show.
 
 use gap_diagnosis::preflight::{Foreseen, IMITATED, Preflight, WANTED_REPEATS};
-use maud::html;
+use maud::{Markup, html};
 
+use super::words::{name_of, with_unit};
 use super::{look_alikes, name, section, three};
 use crate::Report;
+use crate::bars::{self, Bar};
+use crate::page::figure;
 use crate::screen::{Screen, Tile, Tone};
 use crate::section::Section;
 use crate::terminal::{self, Part, Rank};
 
+/// Most bars of the first screen.
+const MOST_BARS_OF_KINDS: usize = 8;
 /// Names of other effects in one cell.
 const MOST_NAMES: usize = 3;
 
@@ -64,8 +69,9 @@ fn screen(forecast: &Preflight, minutes: f64) -> Screen {
     let alike = imitated_effects(forecast);
     let minutes = three(minutes);
     let sentence = format!(
-        "In {minutes} min {n} effects would show; {} of them look like others.",
-        alike.len()
+        "In {minutes} min this plan would show {n} effects; {} of them look like others, and {} kinds would not show.",
+        alike.len(),
+        forecast.not_excited.len()
     );
     let hidden = forecast.not_excited.iter();
     let hidden: Vec<String> = hidden.map(|effect| name(&effect.effect, "")).collect();
@@ -85,6 +91,7 @@ fn screen(forecast: &Preflight, minutes: f64) -> Screen {
                 few(&hidden),
             ),
         ],
+        picture: picture(forecast),
         ..Screen::default()
     }
 }
@@ -157,7 +164,7 @@ fn temperatures(rehearsed: &Rehearsed<'_>) -> Section {
     let rows = changes.map(|(sensor, change_k)| vec![sensor.clone(), three(*change_k)]);
     section(
         "Temperatures that are assumed",
-        &["thermometer", "changes by K"],
+        &["thermometer", "changes by / K"],
         rows.collect(),
         "Of a machining centre of usual size that begins cold, by its axes and spindle as the plan moves them, in a room that swings by 2 K within a day. The machine itself does not grow in a forecast.",
     )
@@ -192,11 +199,48 @@ fn imitated(forecast: &Preflight) -> String {
 }
 
 /// From which size others cannot imitate it; never where that is beyond what is physical.
-fn told_apart(effect: &Foreseen) -> String {
+fn told_apart(effect: &Foreseen, factor: f64) -> String {
     let from = effect
         .told_apart_from
         .filter(|from| *from <= effect.greatest);
-    from.map_or_else(|| "never".to_owned(), three)
+    from.map_or_else(|| "never".to_owned(), |from| three(from * factor))
+}
+
+/// Of each kind the target that is found worst, as a bar: the smallest size that would be found over the usual one.
+fn picture(forecast: &Preflight) -> Option<Markup> {
+    let share = |effect: &Foreseen| effect.found_from / effect.typical;
+    let mut worst: Vec<&Foreseen> = Vec::new();
+    for effect in &forecast.effects {
+        match worst.iter_mut().find(|one| one.effect == effect.effect) {
+            Some(one) if share(one) < share(effect) => *one = effect,
+            Some(_) => {}
+            None => worst.push(effect),
+        }
+    }
+    worst.retain(|effect| share(effect).is_finite());
+    worst.sort_by(|a, b| share(a).total_cmp(&share(b)));
+    let left = worst.len().saturating_sub(MOST_BARS_OF_KINDS);
+    let bars: Vec<Bar> = { worst.iter().take(MOST_BARS_OF_KINDS) }
+        .map(|effect| {
+            let (size, factor) = with_unit(&effect.parameter, effect.typical);
+            let unit = size.rsplit_once(" / ").map_or("", |(_, unit)| unit);
+            let from = three(effect.found_from * factor);
+            Bar {
+                name: format!("{}: from {from} {unit}", title_of(effect)),
+                size: 100.0 * share(effect),
+                is_beyond: effect.sin_alone >= IMITATED,
+            }
+        })
+        .collect();
+    let more = match left {
+        0 => String::new(),
+        n => format!(" {n} more kinds need larger sizes."),
+    };
+    let caption = format!(
+        "The kinds of effects that are found best, each at its worst place. Faint: looks like others.{more}"
+    );
+    let axis = "smallest size that would be found / % of its usual size";
+    (!bars.is_empty()).then(|| figure(&bars::svg(axis, &bars), &caption))
 }
 
 fn effects(forecast: &Preflight) -> Section {
@@ -205,15 +249,16 @@ fn effects(forecast: &Preflight) -> Section {
             .alike
             .iter()
             .take(MOST_NAMES)
-            .map(|(name, cos)| format!("{name} {cos:.2}"))
+            .map(|(id, cos)| format!("{} {cos:.2}", name_of(id)))
             .collect();
+        let (size, factor) = with_unit(&effect.parameter, effect.typical);
         vec![
             title_of(effect),
-            three(effect.found_from),
-            told_apart(effect),
-            three(effect.typical),
-            effect.parameter.clone(),
-            three(effect.sin_alone),
+            size,
+            three(effect.found_from * factor),
+            told_apart(effect, factor),
+            three(effect.typical * factor),
+            format!("{:.3}", effect.sin_alone),
             alike.join(", "),
         ]
     });
@@ -221,10 +266,10 @@ fn effects(forecast: &Preflight) -> Section {
         "What would be found",
         &[
             "effect",
+            "size",
             "found from",
             "told apart from",
             "typical",
-            "key of the machine file",
             "sine alone",
             "looks like (cosine)",
         ],
@@ -260,8 +305,8 @@ fn floor(forecast: &Preflight) -> Section {
             "channel",
             "runs",
             "repeats",
-            "of a reading µm",
-            "between runs µm",
+            "of a reading / µm",
+            "between runs / µm",
         ],
         rows.collect(),
         "Rotary axes in mrad. Say what your instruments have with --floor INSTRUMENT=READING/BETWEEN.",

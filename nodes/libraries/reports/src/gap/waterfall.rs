@@ -16,6 +16,7 @@ use maud::Markup;
 
 use super::words::name;
 use crate::page;
+use crate::plot::legend;
 use crate::svg::{Scale, escaped, unsigned_zero};
 
 /// Most causes with a bar of their own; the others share one.
@@ -26,7 +27,12 @@ const ROW_PX: f64 = 60.0;
 /// Most decimals of a size, µm: more are not measured.
 const MOST_DECIMALS: f64 = 3.0;
 /// Left and right end of the bars, px.
-const BARS_PX: [f64; 2] = [8.0, 712.0];
+const BARS_PX: [f64; 2] = [8.0, 700.0];
+/// Where a row's name has its foot, and its bar its top and its bottom, px.
+const NAME_FOOT_PX: f64 = 26.0;
+const BAR_EDGES_PX: [f64; 2] = [34.0, 52.0];
+/// Colour of the floor.
+const FLOOR_COLOUR: usize = 3;
 
 /// One bar: name, where it begins and where it ends, µm.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,7 +117,7 @@ fn decimals(floor_um: f64) -> usize {
 }
 
 fn drawn(bars: &[Bar], floor_um: f64) -> Result<String, std::fmt::Error> {
-    let height = ROW_PX * bars.len() as f64 + 34.0;
+    let height = ROW_PX * bars.len() as f64 + 36.0;
     // All bars have the decimals that the floor needs: smaller parts are noise.
     let decimals = decimals(floor_um);
     let size = |um: f64| unsigned_zero(format!("{um:.decimals$}"));
@@ -124,30 +130,25 @@ fn drawn(bars: &[Bar], floor_um: f64) -> Result<String, std::fmt::Error> {
         low_px: BARS_PX[0],
         high_px: BARS_PX[1],
     };
-    let mut text = format!(
+    let floor = format!("noise floor {} µm", size(floor_um));
+    let title = "rms of machine minus simulator / µm";
+    let mut text = legend(title, &[(FLOOR_COLOUR, "line dashed", floor.as_str())]);
+    write!(
+        text,
         "<svg class=\"plot\" role=\"img\" aria-label=\"waterfall of the gap\" viewBox=\"0 0 {WATERFALL_WIDTH} {height}\">"
-    );
+    )?;
+    axis(&mut text, &scale, ROW_PX * bars.len() as f64)?;
     for (row, bar) in bars.iter().enumerate() {
         let (a, b) = (scale.px(bar.from_um), scale.px(bar.to_um));
         let (left, width) = (a.min(b), (a - b).abs().max(2.0));
         write!(
             text,
-            "<g class=\"c{}\"><rect x=\"{left:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"18\" fill=\"currentColor\"/></g>",
+            "<g class=\"c{}\"><rect x=\"{left:.1}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{}\" fill=\"currentColor\"/></g>",
             bar.colour,
-            row as f64 * ROW_PX + 34.0,
+            row as f64 * ROW_PX + BAR_EDGES_PX[0],
+            BAR_EDGES_PX[1] - BAR_EDGES_PX[0],
         )?;
     }
-    let at = scale.px(floor_um);
-    let bottom = ROW_PX * bars.len() as f64;
-    write!(
-        text,
-        "<path stroke=\"currentColor\" stroke-dasharray=\"5 4\" d=\"M{at:.1} 26V{:.1}\"/><text x=\"{:.1}\" y=\"{:.1}\">floor {} µm</text>",
-        bottom + 6.0,
-        at.min(WATERFALL_WIDTH - 220.0),
-        bottom + 28.0,
-        size(floor_um)
-    )?;
-    // Names stand above the line of the floor.
     for (row, bar) in bars.iter().enumerate() {
         let change = bar.to_um - bar.from_um;
         let size = size(change.abs());
@@ -159,14 +160,53 @@ fn drawn(bars: &[Bar], floor_um: f64) -> Result<String, std::fmt::Error> {
         };
         write!(
             text,
-            "<text class=\"halo\" x=\"{}\" y=\"{:.1}\">{}: {sign}{size} µm</text>",
+            "<text x=\"{}\" y=\"{:.1}\">{}: {sign}{size} µm</text>",
             BARS_PX[0],
-            row as f64 * ROW_PX + 26.0,
+            row as f64 * ROW_PX + NAME_FOOT_PX,
             escaped(&bar.name),
         )?;
     }
+    floor_line(&mut text, scale.px(floor_um), bars.len())?;
     text.push_str("</svg>");
     Ok(text)
+}
+
+/// Round sizes below the bars, with lines between the names alone.
+fn axis(text: &mut String, scale: &Scale, bottom: f64) -> std::fmt::Result {
+    for (value, label) in scale.ticks() {
+        let at = scale.px(value);
+        write!(
+            text,
+            "<path stroke=\"currentColor\" stroke-opacity=\"0.4\" d=\"M{at:.1} {:.1}V{bottom}\"/><text x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>",
+            bottom - 6.0,
+            bottom + 24.0
+        )?;
+    }
+    let [left, right] = BARS_PX;
+    write!(
+        text,
+        "<path stroke=\"currentColor\" stroke-opacity=\"0.4\" d=\"M{left} {bottom}H{right}\"/>"
+    )
+}
+
+/// The floor across each bar; the names between the bars stay free.
+fn floor_line(text: &mut String, at: f64, rows: usize) -> std::fmt::Result {
+    write!(
+        text,
+        "<g class=\"c{FLOOR_COLOUR}\"><path stroke=\"currentColor\" stroke-width=\"2\" stroke-dasharray=\"5 4\" d=\""
+    )?;
+    let [top, bottom] = BAR_EDGES_PX;
+    for row in 0..rows {
+        let y = row as f64 * ROW_PX;
+        write!(
+            text,
+            "M{at:.1} {:.1}V{:.1}",
+            y + top - 2.0,
+            y + bottom + 4.0
+        )?;
+    }
+    text.push_str("\"/></g>");
+    Ok(())
 }
 
 #[cfg(test)]
@@ -203,6 +243,33 @@ mod tests {
         );
         let text = drawn(&bars(1.0, 1.0, &[("a".to_owned(), 1.0)]), 0.5).unwrap();
         assert!(text.contains("a: 0.00 µm"), "{text}");
+    }
+
+    #[test]
+    fn the_floor_crosses_bars_and_no_name() {
+        let text = drawn(&bars(5.0, 3.0, &[("a".to_owned(), 1.0)]), 0.4).unwrap();
+        let dashed = text.split("stroke-dasharray").nth(1).unwrap();
+        let path = dashed
+            .split("d=\"")
+            .nth(1)
+            .unwrap()
+            .split('"')
+            .next()
+            .unwrap();
+        let stretches: Vec<(f64, f64)> = { path.split('M').skip(1) }
+            .map(|one| {
+                let (top, bottom) = one.split_once(' ').unwrap().1.split_once('V').unwrap();
+                (top.parse().unwrap(), bottom.parse().unwrap())
+            })
+            .collect();
+        assert_eq!(stretches.len(), 3, "{path}");
+        // A name of 26 px on a phone stands from 22 px above its foot to 6 px below it.
+        for row in 0..3 {
+            let foot = f64::from(row) * ROW_PX + NAME_FOOT_PX;
+            let is_free = |(top, bottom): &(f64, f64)| *bottom < foot - 22.0 || *top >= foot + 6.0;
+            assert!(stretches.iter().all(is_free), "{path}");
+        }
+        assert!(text.contains("rms of machine minus simulator / µm"));
     }
 
     #[test]

@@ -64,7 +64,30 @@ pub(super) fn in_units(key: &str, value: f64) -> (String, f64, &'static str) {
         "mm" if value.abs() < SHORT_MM => (1e3, "µm"),
         unit => (1.0, unit),
     };
-    (label.replace('_', " "), factor, unit)
+    (part_of_curve(label), factor, unit)
+}
+
+/// An amplitude of a curve by its power or its wave, and any other without underscores.
+fn part_of_curve(label: &str) -> String {
+    let part = match label.strip_prefix("free_").unwrap_or(label) {
+        "p1" => "linear part",
+        "p2" => "quadratic part",
+        "p3" => "cubic part",
+        "p4" => "part of degree 4",
+        "sin" => "sine part",
+        "cos" => "cosine part",
+        other => return other.replace('_', " "),
+    };
+    part.to_owned()
+}
+
+/// An amplitude and the unit in which its sizes about `typical` are written, such as `width / µm`, and the factor to it.
+pub(super) fn with_unit(key: &str, typical: f64) -> (String, f64) {
+    let (label, factor, unit) = in_units(key, typical);
+    match unit {
+        "" => (label, factor),
+        unit => (format!("{label} / {unit}"), factor),
+    }
 }
 
 /// The angle between two linear axes such as `XY`.
@@ -154,10 +177,16 @@ mod tests {
             ("width_mm", 0.004, ("width", 1e3, "µm")),
             ("period_mm", 10.0, ("period", 1.0, "mm")),
             ("fixed_end", 1.0, ("fixed end", 1.0, "")),
+            ("p1_urad", 10.0, ("linear part", 1.0, "µrad")),
+            ("free_p3_um", 1.0, ("cubic part", 1.0, "µm")),
         ] {
             let (label, factor, unit) = in_units(key, value);
             assert_eq!((label.as_str(), factor, unit), wanted, "{key}");
         }
+        let (label, factor) = with_unit("width_mm", 0.004);
+        assert_eq!(label, "width / µm");
+        assert!((factor - 1e3).abs() < 1e-9);
+        assert_eq!(with_unit("fixed_end", 1.0).0, "fixed end");
     }
 
     #[test]

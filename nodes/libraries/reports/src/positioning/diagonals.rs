@@ -3,7 +3,7 @@
 use anyhow::Result;
 use iso230::diagonal;
 use iso230::diagonal::{DiagonalResult, DiagonalRuns, DiagonalsResult, SpaceDiagonal};
-use iso230::positioning::{PointResult, PositioningRuns};
+use iso230::positioning::PositioningRuns;
 use metrology::sample::TestKind;
 
 use super::{LEAST_SHARE, LENGTHS, capital, figure, periods_mm, runs, side_of};
@@ -14,6 +14,11 @@ use crate::evaluate::linear::LinearTest;
 use crate::plot::{self, Plot, Trace};
 use crate::section::{Drawing, NOT_EVALUATED, Rows, Section, head, um};
 use crate::terminal::Rank;
+
+/// Begin of the title of a test along a diagonal.
+pub(super) const DIAGONAL: &str = "Diagonal ";
+/// What the letters of a space diagonal mean.
+const LETTERS: &str = "PPP, NPP, PNP and PPN: whether X, Y and Z run in the positive (P) or negative (N) direction from the lower end to the upper.";
 
 /// The space diagonal along which a test ran, and whether it ran it upwards.
 fn space_diagonal(test: &LinearTest) -> Option<(SpaceDiagonal, bool)> {
@@ -32,6 +37,37 @@ fn space_diagonal(test: &LinearTest) -> Option<(SpaceDiagonal, bool)> {
         _ => SpaceDiagonal::Ppp,
     };
     Some((diagonal, upwards))
+}
+
+/// A title of a test whose beam along a space diagonal has the diagonal's letters, in capitals: `Diagonal NPP, run 8 on` of
+/// `Diagonal npp, run 8 on`. Histories know the test by the beam's own letters.
+#[must_use]
+pub fn shown_title(title: &str) -> String {
+    let letters = title.strip_prefix(DIAGONAL).and_then(|rest| rest.get(..3));
+    let named = |letters: &str| {
+        let mut all = SpaceDiagonal::ALL.into_iter().map(SpaceDiagonal::name);
+        all.find(|name| name.eq_ignore_ascii_case(letters))
+    };
+    let is_whole = |rest: &str| !rest.starts_with(char::is_alphanumeric);
+    let behind = title
+        .get(DIAGONAL.len() + 3..)
+        .filter(|rest| is_whole(rest));
+    match (letters.and_then(named), behind) {
+        (Some(name), Some(behind)) => format!("{DIAGONAL}{name}{behind}"),
+        _ => title.to_owned(),
+    }
+}
+
+/// The name of a test, by the letters of its space diagonal where its beam has another name.
+pub(super) fn shown_name(test: &LinearTest) -> String {
+    let Some((diagonal, _)) = space_diagonal(test) else {
+        return test.name.clone();
+    };
+    let letters = diagonal.name();
+    if test.name.is_empty() || letters.eq_ignore_ascii_case(&test.name) {
+        return letters.to_owned();
+    }
+    format!("{letters} (beam {})", test.name)
 }
 
 /// The runs as they are upwards along the diagonal, positions counted from its lower end.
@@ -66,7 +102,7 @@ fn from_lower_end(runs: &mut PositioningRuns) {
 fn one_way(tests: &[LinearTest]) -> Option<Section> {
     let is_one_way = |test: &&LinearTest| space_diagonal(test).is_some() && side_of(test).is_some();
     let one_way = tests.iter().filter(is_one_way);
-    let names: Vec<&str> = one_way.map(|test| test.name.as_str()).collect();
+    let names: Vec<String> = one_way.map(shown_name).collect();
     if names.is_empty() {
         return None;
     }
@@ -137,7 +173,7 @@ fn diagonals_section(
                 measured.reservation(),
                 figure(&result.systematic_error, lengths_stated),
                 figure(&result.reversal, measured.is_stated),
-                um(range_of_lengths_mm(&result)),
+                figure(&result.lengths, lengths_stated),
                 figure(&result.spread, lengths_stated),
                 measured.coverage()
             )));
@@ -155,7 +191,7 @@ fn diagonals_section(
             });
             if measured.is_stated && !lengths_stated {
                 unstate_named(&mut section.figures, &LENGTHS);
-                unstate_named(&mut section.figures, &["spread"]);
+                unstate_named(&mut section.figures, &["spread", "lengths"]);
             }
         }
         Err(error) => section.not_evaluated(error),
@@ -180,24 +216,10 @@ fn drawing(result: &DiagonalsResult) -> Result<Drawing> {
     };
     Ok(Drawing {
         svg: plot::svg(&plot)?,
-        caption: "The four diagonals from the mean at their lower end: lines of one slope show a scale error, of several squareness."
-            .to_owned(),
+        caption: format!(
+            "The four diagonals from the mean at their lower end: lines of one slope show a scale error, of several squareness. {LETTERS}"
+        ),
     })
-}
-
-/// By how much a diagonal is too long, mm: the mean of both directions at its end less that at its begin.
-fn too_long_mm(one: &DiagonalResult) -> f64 {
-    let points = &one.positioning.points;
-    let mean = |point: Option<&PointResult>| {
-        point.map_or(f64::NAN, |p| f64::midpoint(p.up.mean_mm, p.down.mean_mm))
-    };
-    mean(points.last()) - mean(points.first())
-}
-
-/// The longest diagonal less the shortest one, mm.
-fn range_of_lengths_mm(result: &DiagonalsResult) -> f64 {
-    let all = || result.diagonals.iter().map(too_long_mm);
-    all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min)
 }
 
 fn of_diagonals(result: &DiagonalsResult, measured: &Measured) -> Rows {
@@ -206,7 +228,7 @@ fn of_diagonals(result: &DiagonalsResult, measured: &Measured) -> Rows {
         let found = &one.positioning;
         vec![
             one.diagonal.name().to_owned(),
-            um(too_long_mm(one)),
+            um(one.too_long_mm()),
             figure(&found.systematic_error, lengths_stated),
             figure(&found.reversal, stated),
             figure(&found.repeatability, stated),
@@ -245,6 +267,30 @@ mod tests {
             );
         }
         assert_eq!(space_diagonal(&test([1.0, 1.0, 0.0])), None);
+    }
+
+    #[test]
+    fn letters_of_a_diagonal_are_capitals_and_another_name_of_its_beam_stays() {
+        for (title, shown) in [
+            (
+                "Diagonal npp, run 8 on: by the laser",
+                "Diagonal NPP, run 8 on: by the laser",
+            ),
+            ("Diagonal PPN: by the laser", "Diagonal PPN: by the laser"),
+            ("Diagonal pppx, run 8 on", "Diagonal pppx, run 8 on"),
+            ("Diagonal d1, run 8 on", "Diagonal d1, run 8 on"),
+            ("Diagonal µµ", "Diagonal µµ"),
+            ("Positioning ppp", "Positioning ppp"),
+        ] {
+            assert_eq!(shown_title(title), shown);
+        }
+        let named = |name: &str| LinearTest {
+            name: name.to_owned(),
+            ..test([-1.0, 1.0, 1.0])
+        };
+        assert_eq!(shown_name(&named("npp")), "NPP");
+        assert_eq!(shown_name(&named("")), "NPP");
+        assert_eq!(shown_name(&named("beam_2")), "NPP (beam beam_2)");
     }
 
     #[test]
@@ -289,7 +335,10 @@ mod tests {
             linear: four.map(five_runs).to_vec(),
             ..Tests::default()
         };
-        let answer = sections(&tests, None).remove(0).answers.remove(0);
+        let section = sections(&tests, None).remove(0);
+        let caption = &section.drawings[0].caption;
+        assert!(caption.ends_with(LETTERS), "{caption}");
+        let answer = section.answers[0].clone();
         assert!(
             answer.starts_with("As measured, not at 20 °C: systematic"),
             "{answer}"
@@ -304,5 +353,13 @@ mod tests {
         }
         let answer = sections(&longer, None).remove(0).answers.remove(0);
         assert!(answer.contains("differ by 10.00 µm"), "{answer}");
+        let text = include_str!("../../../../../launch_configs/diagonals/budget.yaml");
+        let budget = Budget::read(text, std::path::Path::new("budget.yaml")).unwrap();
+        let section = sections(&longer, Some(&budget)).remove(0);
+        assert!(
+            section.answers[0].contains("differ by 10.00 ± "),
+            "{:?}",
+            section.answers
+        );
     }
 }

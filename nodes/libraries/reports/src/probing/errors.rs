@@ -57,6 +57,9 @@ pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section>
     }
     (!found.is_empty()).then(|| {
         let mut section = Section::new("Probing errors of form and size, ISO 230-10");
+        for answer in answers(&found, budget.is_some()) {
+            section.answer(answer);
+        }
         for (is_warning, line) in reasons(&found, tests.machine.is_some()) {
             if is_warning {
                 section.warn(NOT_EVALUATED, line);
@@ -92,6 +95,39 @@ fn note(stated: bool) -> String {
     format!(
         "P_FTU,3D of a sphere, P_FTU,2D of a bore or boss: greatest minus least distance from the centre that all touches have with one weight. Size error: measured diameter minus that of the certificate, {SIZE_NOT_AT_20_DEGC}; no conformance of it is decided.{uncertainty}"
     )
+}
+
+/// The probing error of each artefact that was touched as often as the standard asks, of several measurements the greatest.
+fn answers(found: &[Found], stated: bool) -> Vec<String> {
+    let mut greatest: Vec<(&str, &Found, &ExpandedLength)> = vec![];
+    for one in found.iter().filter(|one| one.points == one.usual_points) {
+        let Some(error) = &one.probing_error else {
+            continue;
+        };
+        match greatest
+            .iter_mut()
+            .find(|(known, ..)| *known == one.feature)
+        {
+            Some(entry) if entry.2.value_mm < error.value_mm => *entry = (&one.feature, one, error),
+            Some(_) => {}
+            None => greatest.push((&one.feature, one, error)),
+        }
+    }
+    let in_words = |(feature, one, error): (&str, &Found, &ExpandedLength)| {
+        let name = if one.kind == "sphere" {
+            "P_FTU,3D"
+        } else {
+            "P_FTU,2D"
+        };
+        let coverage = if stated { " (k = 2)" } else { "" };
+        format!(
+            "{name} {} µm{coverage}, of {} points on {feature}, run {}.",
+            figure(error, stated),
+            one.points,
+            one.run
+        )
+    };
+    greatest.into_iter().map(in_words).collect()
 }
 
 /// What has no figure, each reason once, with whether the whole test has none.
@@ -392,7 +428,11 @@ environmental_drift_um: 0.6
             "{}",
             section.terminal()
         );
-        assert_eq!(section.lines, [""; 0]);
+        let scipy_um = by_scipy("form_mm") * 1e3;
+        let answer =
+            format!("P_FTU,3D {scipy_um:.2} ± {form:.2} µm (k = 2), of 25 points on high, run 4.");
+        assert_eq!(section.answers, [answer]);
+        assert!(section.warnings.is_empty());
     }
 
     #[test]

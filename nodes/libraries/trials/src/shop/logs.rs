@@ -403,15 +403,18 @@ fn machine(sensors: &[Sensor]) -> String {
 /// Names of the catalogue for growth that follows a node.
 fn names(sensors: &[Sensor], node: Node, axis: &str) -> Vec<Name> {
     let has_front = sensors.iter().any(|sensor| sensor.node == Node::Front);
-    match node {
+    let own = sensors.iter().filter(|sensor| sensor.node == node);
+    let shifts = own.map(|sensor| name("thermal_shift", &sensor.id));
+    let mut names = match node {
         Node::Front => vec![name("spindle_growth", "")],
         Node::Rear if has_front => vec![name("spindle_growth", "spindle_rear")],
         Node::Rear => vec![name("spindle_growth", "")],
         Node::Column => vec![name("column_bend", "")],
         Node::Bed | Node::Room => vec![name("ambient_drift", axis), name("column_bend", "")],
-        // A standing axis has no elongation that the catalogue knows.
         Node::Nut => vec![],
-    }
+    };
+    names.extend(shifts);
+    names
 }
 
 fn effect(

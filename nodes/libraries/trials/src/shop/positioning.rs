@@ -293,15 +293,16 @@ impl Plan {
         stops.iter().map(of).collect()
     }
 
-    /// Turns of the axis that a beam beside its line reads as a position.
+    /// Turns of the axis that the beam reads as a position. The tool is read on the table, which X' carries and Y' carries both: in
+    /// the frame of X' it stands off by Y and Z, in that of Y' by Z alone, and Z carries it on its own line.
     fn turns(&self) -> Vec<Name> {
-        let letters = match self.axis {
-            "X" => ["CX", "BX"],
-            "Y" => ["CY", "AY"],
-            _ => ["BZ", "AZ"],
+        let [first_mm, second_mm] = self.others_mm;
+        let with_arms: &[(&str, f64)] = match self.axis {
+            "X" => &[("CX", first_mm), ("BX", second_mm)],
+            "Y" => &[("AY", second_mm)],
+            _ => &[],
         };
-        let has_arm = letters.into_iter().zip(self.others_mm);
-        let read = has_arm.filter(|(_, arm_mm)| arm_mm.abs() > 0.0);
+        let read = with_arms.iter().filter(|(_, arm_mm)| arm_mm.abs() > 0.0);
         read.map(|(letters, _)| name("angular_error", letters))
             .collect()
     }
@@ -377,4 +378,32 @@ pub fn machine(leads_mm: [f64; 3]) -> String {
     text + "control: {servo_period_ms: 1.0, pulse_equivalent_um: 0.1, latch: hardware}\n\
         probe: {styli: {a: {radius_mm: 3.0, length_mm: 50.0}}, mounted: a, standoff_mm: 2.0, overtravel_mm: 3.0, \
         feed_mm_min: 120.0, repeatability_um: 0.3}\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand, for the chain of `machine`: Z carries the tool on its own line, and where X' stands is no arm of Y'.
+    #[test]
+    fn a_turn_is_read_where_the_chain_gives_it_an_arm() {
+        let turns = |axis, others_mm| {
+            let plan = Plan {
+                axis,
+                layout: Layout::OneWay,
+                targets_mm: vec![0.0, 10.0],
+                cycles: 1,
+                dwell_s: 2.0,
+                lead_mm: 10.0,
+                others_mm,
+            };
+            let names = plan.turns().into_iter().map(|(_, letters)| letters);
+            names.collect::<Vec<String>>()
+        };
+        assert_eq!(turns("X", [50.0, 80.0]), ["CX", "BX"]);
+        assert_eq!(turns("X", [0.0, 80.0]), ["BX"]);
+        assert_eq!(turns("Y", [50.0, 80.0]), ["AY"]);
+        assert!(turns("Y", [50.0, 0.0]).is_empty());
+        assert!(turns("Z", [50.0, 80.0]).is_empty());
+    }
 }

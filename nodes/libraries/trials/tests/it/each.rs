@@ -163,7 +163,8 @@ fn every_effect_that_a_recording_shows_is_named_alone() {
     let recordings = recordings();
     let is_judged = |kind: &&&'static Kind| {
         let has_plant = Class::ALL.iter().any(|class| class.id() == kind.id);
-        kind.moment == Moment::Mean && !has_plant
+        // Only logs have the shift with a temperature tried, which these recordings are not.
+        kind.moment == Moment::Mean && !has_plant && kind.id != "thermal_shift"
     };
     let kinds: Vec<&'static Kind> = CATALOGUE.iter().filter(is_judged).copied().collect();
     let mut all: Vec<(&'static Kind, Option<Answer>)> = std::thread::scope(|scope| {

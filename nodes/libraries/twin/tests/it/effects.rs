@@ -54,6 +54,7 @@ mod stick_slip;
 mod straightness;
 mod structural_ringing;
 mod stylus_jump;
+mod thermal_shift;
 mod thermometer_lag;
 mod thermometer_noise;
 mod thermometer_offset;

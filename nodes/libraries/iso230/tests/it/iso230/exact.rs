@@ -7,6 +7,7 @@ use iso230::circular::{self, CircularBudget, CircularTest, CircularTrace};
 use iso230::conformance::{Decision, Policy, Specification, decide};
 use iso230::diagonal::{self, DiagonalRuns, SpaceDiagonal};
 use iso230::positioning::PositioningRuns;
+use iso230::positioning::budget::PositioningBudget;
 use iso230::{ExpandedLength, probing};
 use nalgebra::{Vector2, Vector3};
 
@@ -278,6 +279,34 @@ fn val_iso230_6_squareness_by_exact_geometry() {
         result.spread.value_mm,
         end_mm + end_mm + 0.002,
         2e-6,
+    );
+    near("lengths", result.lengths.value_mm, end_mm + end_mm, 2e-6);
+    // One laser and one machine read all four, so temperatures cancel: by hand 2 (0.2² + 2 · 0.2 · 0.5 l/mm · 1e-3) of the
+    // certificate, 2 (0.1²/(4 l) / √3)² of the beam, 2/5 (0.3/√3)² of drift.
+    let budget = PositioningBudget {
+        device: DeviceUncertainty {
+            expanded_uncertainty_mm: 0.4e-3,
+            expanded_uncertainty_per_length: 1e-6,
+            coverage_factor: 2.0,
+        },
+        misalignment_mm: 0.1,
+        machine: Expansion {
+            temperature_half_width_k: 0.5,
+            expansion_per_k: 11e-6,
+            ..EXACT.machine
+        },
+        environmental_drift_mm: 0.6e-3,
+        ..EXACT
+    };
+    let stated = diagonal::evaluate(&given, &budget).unwrap().lengths;
+    let certificate = 2.0 * (0.04 + 2.0 * 0.2 * 0.5e-3 * length_mm);
+    let beam = 2.0 * (0.01e3 / (4.0 * length_mm)).powi(2) / 3.0;
+    let by_hand_um = 2.0 * (certificate + beam + 0.4 * 0.03_f64).sqrt();
+    near(
+        "U",
+        stated.expanded_uncertainty_mm,
+        by_hand_um * 1e-3,
+        1e-12,
     );
     assert_eq!(result.diagonals[1].diagonal, SpaceDiagonal::Npp);
     let shortest = &result.diagonals[1].positioning.points[5];

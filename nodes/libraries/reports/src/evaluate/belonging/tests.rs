@@ -1,4 +1,5 @@
-use metrology::sample::{Sense, TestPlane};
+use metrology::Axis;
+use metrology::sample::{Sense, TestKind, TestPlane};
 
 use super::*;
 
@@ -135,4 +136,68 @@ fn a_run_that_was_not_completed_is_named_where_a_report_would_have_evaluated_it(
     let mut log = open(TestKind::Dwell);
     log.held.push(held("/length/position"));
     assert_eq!(log.evaluated().as_deref(), Some("displacement at rest, X"));
+}
+
+fn grid(zero_id: u32, plane: TestPlane, at_s: f64) -> GridSample {
+    GridSample {
+        at: at(at_s),
+        plane,
+        u_mm: 50.0,
+        v_mm: 0.0,
+        zero_id,
+    }
+}
+
+#[test]
+fn a_reading_of_another_zero_or_plane_is_left_out_where_the_run_needs_one() {
+    for (kind, sample, reason) in [
+        (TestKind::Circle, grid(1, TestPlane::Xy, 100.0), None),
+        (
+            TestKind::Circle,
+            grid(2, TestPlane::Xy, 100.0),
+            Some(Reason::OtherZero),
+        ),
+        (
+            TestKind::Corner,
+            grid(2, TestPlane::Xy, 100.0),
+            Some(Reason::OtherZero),
+        ),
+        (
+            TestKind::Circle,
+            grid(1, TestPlane::Zx, 100.0),
+            Some(Reason::OtherPlane),
+        ),
+        // Of before the begin, or of a plate that nobody reads.
+        (TestKind::Circle, grid(2, TestPlane::Xy, 98.9), None),
+        (TestKind::Positioning, grid(2, TestPlane::Zx, 100.0), None),
+    ] {
+        let judged = open(kind).judge_grid(&sample, log(100.0));
+        match reason {
+            None => assert_eq!(judged, Judged::Counts, "{kind:?}: {sample:?}"),
+            Some(reason) => {
+                assert!(
+                    matches!(&judged, Judged::LeftOut(it, _) if *it == reason),
+                    "{judged:?}"
+                );
+            }
+        }
+    }
+    let length = |zero_id| LengthSample {
+        at: at(100.0),
+        axis: Axis::X,
+        displacement_mm: 200.0,
+        zero_id,
+    };
+    for (kind, has_grid, is_left_out) in [
+        (TestKind::Positioning, true, true),
+        (TestKind::Circle, false, true),
+        // Beside a plate, and where sensors of several heights have a zero each.
+        (TestKind::Circle, true, false),
+        (TestKind::Dwell, false, false),
+    ] {
+        let judge = |zero| open(kind).judge_length(&length(zero), (log(100.0), has_grid));
+        assert_eq!(judge(1), Judged::Counts, "{kind:?}");
+        let is_other = matches!(judge(2), Judged::LeftOut(Reason::OtherZero, _));
+        assert_eq!(is_other, is_left_out, "{kind:?}: {has_grid}");
+    }
 }

@@ -100,9 +100,9 @@ impl Budget {
     pub fn of_ballbar(&self) -> Option<Self> {
         let ballbar = self.ballbar.as_ref()?;
         let mut own = self.clone();
-        own.grid_encoder = ballbar.reading();
+        own.grid_encoder = Some(ballbar.reading());
         if let Some(body) = &ballbar.body {
-            own.device = body.clone();
+            own.device = Some(body.clone());
         }
         Some(own)
     }

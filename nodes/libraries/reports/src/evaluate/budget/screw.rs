@@ -16,8 +16,15 @@ impl Budget {
     pub fn of_screw(&self, axis: Axis) -> Option<Self> {
         let screw = self.screws.get(&axis)?;
         let mut own = self.clone();
-        own.machine = screw.clone();
+        own.machine = Some(screw.clone());
         Some(own)
+    }
+
+    /// Thermometers of the ball screw of an axis; none where the budget states no screw of it.
+    #[must_use]
+    pub fn thermometers_of_screw(&self, axis: Axis) -> &[String] {
+        let screw = self.screws.get(&axis);
+        screw.map_or(&[], |screw| &screw.thermometers)
     }
 
     /// Every screw with its name.
@@ -48,7 +55,7 @@ impl Budget {
 
 impl Body {
     /// Its numbers above 0 by their keys.
-    const fn numbers(&self) -> [(&'static str, f64); 3] {
+    pub(super) const fn numbers(&self) -> [(&'static str, f64); 3] {
         [
             ("temperature_half_width_k", self.temperature_half_width_k),
             ("expansion_um_per_m_k", self.expansion_um_per_m_k),

@@ -57,7 +57,7 @@ fn readings(degc: &[f64]) -> Readings {
 fn a_body_is_as_warm_as_it_is_stated_or_as_its_thermometers_read_during_the_test() {
     let budget = Budget::read(WHOLE, Path::new("budget.yaml")).unwrap();
     let nothing = Thermometers::new();
-    let stated = budget.machine.temperature(&nothing).unwrap();
+    let stated = budget.machine_body().temperature(&nothing).unwrap();
     assert_eq!((stated.deviation_k, stated.half_width_k), (0.5, 0.5));
     let text = WHOLE.replacen(
         "temperature_deviation_k: 0.5",
@@ -65,7 +65,7 @@ fn a_body_is_as_warm_as_it_is_stated_or_as_its_thermometers_read_during_the_test
         1,
     );
     let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
-    let why = budget.machine.temperature(&nothing).unwrap_err();
+    let why = budget.machine_body().temperature(&nothing).unwrap_err();
     assert!(
         why.contains("thermometer bed, which has no reading"),
         "{why}"
@@ -75,20 +75,41 @@ fn a_body_is_as_warm_as_it_is_stated_or_as_its_thermometers_read_during_the_test
         ("bed".to_owned(), readings(&[22.0, 22.6])),
         ("nut_x".to_owned(), readings(&[21.8, 23.6])),
     ]);
-    let found = budget.machine.temperature(&read).unwrap();
+    let found = budget.machine_body().temperature(&read).unwrap();
     assert!((found.deviation_k - 2.5).abs() < 1e-12, "{found:?}");
     assert!(
         (found.half_width_k - 0.61_f64.sqrt()).abs() < 1e-12,
         "{found:?}"
     );
+    // Kelvins of a driver: the bounds of temperature_deviation_k hold for thermometers too.
+    for (degc, is_known) in [
+        (119.9, true),
+        (-79.9, true),
+        (295.15, false),
+        (-80.1, false),
+    ] {
+        let read = Thermometers::from([
+            ("bed".to_owned(), readings(&[22.0, degc])),
+            ("nut_x".to_owned(), readings(&[22.0])),
+        ]);
+        let found = budget.machine_body().temperature(&read);
+        assert_eq!(found.is_ok(), is_known, "{degc}");
+        if let Err(why) = found {
+            let words = format!("temperature/bed read {degc} °C");
+            assert!(
+                why.contains(&words) && why.contains("from -80 to 120 °C"),
+                "{why}"
+            );
+        }
+    }
     let text = text.replacen("thermometers: [bed, nut_x], ", "", 1);
     let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
-    let why = budget.machine.temperature(&read).unwrap_err();
+    let why = budget.machine_body().temperature(&read).unwrap_err();
     assert!(
         why.contains("neither temperature_deviation_k nor thermometers"),
         "{why}"
     );
-    assert!(budget.device.temperature(&nothing).is_ok());
+    assert!(budget.device_body().temperature(&nothing).is_ok());
 }
 
 #[test]
@@ -184,7 +205,6 @@ fn a_wrong_budget_is_refused_with_key_and_value() {
             .contains("misalignment_mm = -0.1 mm: must be from 0 to 100 mm")
     );
     assert!(refusal("misalignment_mm: 0.1", "misalignment_um: 0.1").contains("misalignment_um"));
-    assert!(refusal("misalignment_mm: 0.1\n", "").contains("misalignment_mm"));
     assert!(
         refusal("coverage_factor: 2.0", "coverage_factor: 0.0")
             .contains("grid_encoder.coverage_factor = 0")

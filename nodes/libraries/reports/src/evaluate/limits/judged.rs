@@ -8,6 +8,7 @@ use iso230::{ExpandedAngle, ExpandedLength};
 use serde_json::Value;
 
 use super::limit::Limit;
+use crate::positioning::shown_title;
 use crate::section::um;
 
 /// A decision for a figure, in words.
@@ -174,8 +175,8 @@ impl Judged {
             (value, format!("{:.3}", self.probability))
         };
         vec![
-            name.to_owned(),
-            test.to_owned(),
+            in_words(name),
+            shown_title(test),
             value,
             limits,
             decision.to_owned(),
@@ -184,11 +185,45 @@ impl Judged {
     }
 }
 
+/// What stands between the words of a figure and its standard.
+pub const BEFORE_STANDARD: &str = ", ISO ";
+
+/// The name of a figure in words with its standard: `up accuracy, ISO 230-2` of `iso230_2.up.accuracy`.
+fn in_words(name: &str) -> String {
+    let (family, own) = name.split_once('.').unwrap_or(("", name));
+    let own = own.strip_prefix("figures.").unwrap_or(own);
+    let own = own.replace(['_', '.'], " ");
+    let mut parts = family.split('_');
+    match (
+        parts.next().and_then(|first| first.strip_prefix("iso")),
+        parts.next(),
+    ) {
+        (Some(norm), Some(part)) => format!("{own}{BEFORE_STANDARD}{norm}-{part}"),
+        _ => own,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
     use crate::evaluate::limits::Limits;
+
+    #[test]
+    fn a_figure_has_words_and_the_number_of_its_standard() {
+        for (name, words) in [
+            ("iso230_2.accuracy", "accuracy, ISO 230-2"),
+            ("iso230_2.up.mean_reversal", "up mean reversal, ISO 230-2"),
+            (
+                "iso230_2_rotary.figures.both.accuracy",
+                "both accuracy, ISO 230-2",
+            ),
+            ("iso230_3_log.figures.range", "range, ISO 230-3"),
+            ("own", "own"),
+        ] {
+            assert_eq!(super::in_words(name), words);
+        }
+    }
 
     #[test]
     fn a_figure_with_a_sign_and_an_upper_limit_alone_gives_a_remark() {

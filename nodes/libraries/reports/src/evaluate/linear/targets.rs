@@ -9,10 +9,46 @@ const BOTH: &[usize] = &[0, 1];
 /// Fewest targets of a test.
 const LEAST_TARGETS: usize = 2;
 
+/// Stops at most this far from their neighbour are at one place, mm and deg: the least input increment of most controls is
+/// coarser. Programs in inches and motions in ticks end beside their target by less.
+pub(in crate::evaluate) const SAME_PLACE: f64 = 1e-4;
+/// Places are stated as multiples of this, mm and deg.
+const STATED: f64 = 1e-6;
+
+/// The places of all runs of a test, ascending, each with the greatest position that belongs to it.
+#[derive(Debug)]
+pub(in crate::evaluate) struct Places(Vec<[f64; 2]>);
+
+impl Places {
+    /// Of the positions of all stops: neighbours within [`SAME_PLACE`] are one place, at the middle of its positions.
+    pub(in crate::evaluate) fn of(positions: impl Iterator<Item = f64>) -> Self {
+        let mut all: Vec<f64> = positions.collect();
+        all.sort_by(f64::total_cmp);
+        let groups = all.chunk_by(|a, b| b - a <= SAME_PLACE);
+        let ends = groups.filter_map(|group| Some((group.first()?, group.last()?)));
+        let place = |(first, last): (&f64, &f64)| {
+            let middle = f64::midpoint(*first, *last);
+            [(middle / STATED).round() * STATED, *last]
+        };
+        Self(ends.map(place).collect())
+    }
+
+    /// The number of the place of a stop.
+    pub(in crate::evaluate) fn number(&self, position: f64) -> usize {
+        self.0.partition_point(|[_, last]| *last < position)
+    }
+
+    /// The positions of places by their numbers.
+    pub(in crate::evaluate) fn at(&self, numbers: &[usize]) -> Vec<f64> {
+        let known = numbers.iter().filter_map(|number| self.0.get(*number));
+        known.map(|[at, _]| *at).collect()
+    }
+}
+
 /// The places that every run approached once from each of the sides, and these sides.
-pub(in crate::evaluate) fn targets(runs: &[Visits]) -> (Vec<i64>, &'static [usize]) {
-    let complete = |sides: &'static [usize]| -> Vec<i64> {
-        let once = |run: &Visits, place: &i64| {
+pub(in crate::evaluate) fn targets(runs: &[Visits]) -> (Vec<usize>, &'static [usize]) {
+    let complete = |sides: &'static [usize]| -> Vec<usize> {
+        let once = |run: &Visits, place: &usize| {
             run.get(place)
                 .is_some_and(|visits| sides.iter().all(|side| visits[*side].len() == 1))
         };
@@ -33,15 +69,15 @@ pub(in crate::evaluate) fn targets(runs: &[Visits]) -> (Vec<i64>, &'static [usiz
 }
 
 /// Places with readings that are no targets, with the runs that lack a reading or have several. Turning points beyond
-/// the targets that every run came to from one side alone are as they should be. `grid` is the spacing of places in `unit`.
+/// the targets that every run came to from one side alone are as they should be.
 pub(in crate::evaluate) fn left_out(
     runs: &[Visits],
     numbers: &[u32],
-    (targets, sides): (&[i64], &[usize]),
-    (grid, unit): (f64, &str),
+    (targets, sides): (&[usize], &[usize]),
+    (places, unit): (&Places, &str),
 ) -> Vec<String> {
-    let all: BTreeSet<i64> = runs.iter().flat_map(BTreeMap::keys).copied().collect();
-    let within = |place: &i64| {
+    let all: BTreeSet<usize> = runs.iter().flat_map(BTreeMap::keys).copied().collect();
+    let within = |place: &usize| {
         targets.first().is_some_and(|first| place >= first)
             && targets.last().is_some_and(|last| place <= last)
     };
@@ -57,7 +93,7 @@ pub(in crate::evaluate) fn left_out(
             let counts = counts(*side);
             if counts.iter().all(|n| *n == 0) {
                 if within(place) {
-                    flaws.push(format!("no run came to it {from}"));
+                    flaws.push(format!("no run has a reading {from}"));
                 }
                 continue;
             }
@@ -69,8 +105,8 @@ pub(in crate::evaluate) fn left_out(
                 }
             }
         }
-        if !flaws.is_empty() {
-            let at = *place as f64 * grid;
+        let at = places.at(&[*place]);
+        if let (false, Some(at)) = (flaws.is_empty(), at.first()) {
             lines.push(format!("{at:.3} {unit}: {}", shortened(&flaws)));
         }
     }

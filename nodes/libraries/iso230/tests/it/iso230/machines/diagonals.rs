@@ -10,12 +10,19 @@ use super::{
     within_limits,
 };
 
-/// E and B of one diagonal and all its means, by the words of the standard.
-fn of_truth(runs: &PositioningRuns) -> (f64, f64, Vec<f64>) {
+/// E and B of one diagonal, its length and all its means, by the words of the standard.
+fn of_truth(runs: &PositioningRuns) -> (f64, f64, f64, Vec<f64>) {
     let (up, down) = (columns(&runs.up_mm), columns(&runs.down_mm));
     let means: Vec<f64> = up.iter().chain(&down).map(|c| c[0]).collect();
     let reversals = up.iter().zip(&down).map(|(u, d)| (u[0] - d[0]).abs());
-    (range(&means), reversals.fold(f64::MIN, f64::max), means)
+    let both: Vec<f64> = up
+        .iter()
+        .zip(&down)
+        .map(|(u, d)| (u[0] + d[0]) / 2.0)
+        .collect();
+    let length_mm = both[both.len() - 1] - both[0];
+    let reversal_mm = reversals.fold(f64::MIN, f64::max);
+    (range(&means), reversal_mm, length_mm, means)
 }
 
 fn tested(seed: u64, off: fn(&mut Pcg64Mcg) -> f64) -> Vec<Held> {
@@ -59,13 +66,15 @@ fn tested(seed: u64, off: fn(&mut Pcg64Mcg) -> f64) -> Vec<Held> {
         read.push(DiagonalRuns { diagonal, runs });
     }
     let found = evaluate(&read, &laser.budget()).unwrap();
-    let all: Vec<f64> = truths.iter().flat_map(|t| t.2.clone()).collect();
+    let all: Vec<f64> = truths.iter().flat_map(|t| t.3.clone()).collect();
+    let lengths_mm: Vec<f64> = truths.iter().map(|t| t.2).collect();
     let most =
-        |of: fn(&(f64, f64, Vec<f64>)) -> f64| truths.iter().map(of).fold(f64::MIN, f64::max);
+        |of: fn(&(f64, f64, f64, Vec<f64>)) -> f64| truths.iter().map(of).fold(f64::MIN, f64::max);
     [
         ("E_d", found.systematic_error, most(|t| t.0)),
         ("B_d", found.reversal, most(|t| t.1)),
         ("spread", found.spread, range(&all)),
+        ("lengths", found.lengths, range(&lengths_mm)),
     ]
     .map(|(name, figure, truth)| Held {
         name,

@@ -76,15 +76,15 @@ fn recorded(
 fn of_result(found: &RotaryResult) -> [ExpandedAngle; 9] {
     let (both, up) = (found.both.unwrap(), found.up.unwrap());
     [
-        both.accuracy,
+        both.accuracy.unwrap(),
         both.systematic_error,
-        both.repeatability,
+        both.repeatability.unwrap(),
         both.reversal,
         both.mean_reversal,
         both.mean_systematic_error,
-        up.accuracy,
+        up.accuracy.unwrap(),
         up.systematic_error,
-        up.repeatability,
+        up.repeatability.unwrap(),
     ]
 }
 

@@ -1,0 +1,101 @@
+//! The bags of a diagnosis. Tables among them are imported into folders that go away.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+use gap_diagnosis::GapReport;
+
+use crate::import::Named;
+use crate::report_bag::from_table::{self, FromTable};
+
+/// Bags as they are read, and the tables that some were made of.
+pub struct Opened {
+    /// Each bag, in the order of the arguments.
+    pub bags: Vec<PathBuf>,
+    tables: Vec<FromTable>,
+}
+
+impl Opened {
+    /// Takes bags as they are, and imports tables for a machine file (its name and its text) by a map, or by what is
+    /// recognised in them.
+    ///
+    /// # Errors
+    /// When a map is named without a table, a table without a machine file, or a table cannot be imported.
+    pub fn of(
+        paths: &[PathBuf],
+        map: Option<&Path>,
+        machine: Option<(&str, &str)>,
+    ) -> Result<Self> {
+        let (mut bags, mut tables) = (vec![], vec![]);
+        for path in paths {
+            if !from_table::is_table(path) {
+                bags.push(path.clone());
+                continue;
+            }
+            let Some((name, text)) = machine else {
+                bail!(
+                    "{}: a table has no machine file: name it with --machine",
+                    path.display()
+                );
+            };
+            let machine = Named {
+                place: name.to_owned(),
+                text: text.to_owned(),
+            };
+            let table = from_table::of_machine(path, map, machine)?;
+            bags.push(table.bag.clone());
+            tables.push(table);
+        }
+        if tables.is_empty() && map.is_some() {
+            bail!("--map does nothing: none of the bags is a table: remove it");
+        }
+        Ok(Self { bags, tables })
+    }
+
+    /// What was recognised in the tables and what they lack, a line each.
+    pub fn lines(&self) -> Vec<String> {
+        let tables = self.tables.iter();
+        tables
+            .flat_map(|table| table.lines.iter().cloned())
+            .collect()
+    }
+
+    /// What was assumed of columns, and readings that no machine has.
+    pub fn warnings(&self) -> Vec<String> {
+        self.tables.iter().flat_map(FromTable::warnings).collect()
+    }
+
+    /// Whether any of them is a table.
+    pub fn has_tables(&self) -> bool {
+        !self.tables.is_empty()
+    }
+
+    /// Whether every cell of the tables holds a value.
+    pub fn is_whole(&self) -> bool {
+        self.tables.iter().all(|table| table.n_odd == 0)
+    }
+
+    /// Names bags in a report as they were given: the folder of a table is no more when it is read.
+    pub fn name_as_given(&self, report: &mut GapReport, given: &[PathBuf]) {
+        for (bag, path) in report.inputs.bags.iter_mut().zip(given) {
+            bag.path = path.display().to_string();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_needs_a_machine_file_and_a_map_needs_a_table() {
+        let said = |paths: &[&str], map: Option<&str>| {
+            let paths: Vec<PathBuf> = paths.iter().map(PathBuf::from).collect();
+            let refused = Opened::of(&paths, map.map(Path::new), None).err();
+            refused.map(|error| error.to_string()).unwrap_or_default()
+        };
+        assert!(said(&["laser.csv"], None).contains("name it with --machine"));
+        assert!(said(&["bag"], Some("map.yaml")).contains("none of the bags is a table"));
+        assert_eq!(said(&["bag"], None), "");
+    }
+}

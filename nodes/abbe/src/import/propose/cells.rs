@@ -1,0 +1,66 @@
+//! Cells that are no numbers are named where nothing else is recognised.
+
+use super::super::propose;
+use super::super::recognise::of_text;
+
+fn refusal(text: &str) -> String {
+    let home = tempfile::tempdir().unwrap();
+    let path = home.path().join("a.csv");
+    std::fs::write(&path, text).unwrap();
+    propose::of(&path).map_or_else(|error| format!("{error:#}"), |found| found.map)
+}
+
+#[test]
+fn a_column_of_no_numbers_is_named_with_line_and_cell() {
+    for odd in [
+        "1.5D-03",
+        "3.5 um",
+        "(3.5)",
+        "3.5-",
+        "\u{ff13}.5",
+        "1.5.2",
+        "0x1F",
+        "1'000.5",
+        "=A2",
+        "~3",
+    ] {
+        for head in [
+            "run;direction;target_mm;deviation_um",
+            "a;b;target_mm;error [um]",
+        ] {
+            let rows: String = [0, 50, 100].map(|mm| format!("1;up;{mm};{odd}\n")).concat();
+            let refused = refusal(&format!("Laser X\n\n{head}\n{rows}"));
+            let name = head.rsplit(';').next().unwrap_or_default();
+            let words = format!("line 4, column \"{name}\": \"{odd}\": must be a number");
+            assert!(refused.contains(&words), "{odd}: {refused}");
+            assert!(!refused.contains("neither"), "{refused}");
+        }
+        let rows = format!("{odd};{odd}\n").repeat(3);
+        let refused = refusal(&format!("target_mm;deviation_um\n{rows}"));
+        let words = format!("line 2, column \"target_mm\": \"{odd}\"");
+        assert!(refused.contains(&words), "{odd}: {refused}");
+    }
+}
+
+#[test]
+fn decimal_commas_in_quotes_are_read_and_commas_of_thousands_are_named() {
+    let text = "run,direction,target_mm,deviation_um\n\"1\",\"up\",\"-280,0\",\"-8,35\"\n\"1\",\"up\",\"-150,3\",\"-7,17\"\n";
+    let found = of_text(text).unwrap().unwrap();
+    assert_eq!((found.separator, found.decimal), (',', ','));
+    let map = refusal(text);
+    assert!(map.contains("deviation_um: \"deviation_um\""), "{map}");
+    let text = "target_mm,deviation_um\n\"1,000\",1\n\"2,000\",2\n\"3,000\",4\n";
+    let refused = refusal(text);
+    assert!(
+        refused.contains(
+            "line 2, column \"target_mm\": \"1,000\": must be a number; with decimal commas"
+        ),
+        "{refused}"
+    );
+    for text in [
+        "a,target_mm,deviation_um\n1,2,3\n2,3,4\n",
+        "t,z_um\n1,2\n3,4\n",
+    ] {
+        assert_eq!(of_text(text).unwrap().unwrap().decimal, '.');
+    }
+}

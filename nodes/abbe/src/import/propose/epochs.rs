@@ -1,0 +1,88 @@
+//! Times that count from other days than 1970-01-01, as some programs write them.
+
+use anyhow::{Result, bail};
+use metrology::yaml::shown;
+
+use super::super::recognise::Known;
+
+/// From 1990 to 2100, s since 1970 (`date -u -d 1990-01-01 +%s`): measurements are in between.
+const MEASURED_S: [f64; 2] = [631_152_000.0, 4_102_444_800.0];
+/// Counts of 100 ns: who writes them, their first day, and 1970 in them.
+const TICKS: [(&str, &str, f64); 2] = [
+    ("ticks of .NET", "0001", 621_355_968_000_000_000.0),
+    ("file times of Windows", "1601", 116_444_736_000_000_000.0),
+];
+const TICKS_A_SECOND: f64 = 1e7;
+/// 1970 in seconds since 1904, which LabVIEW writes.
+const LABVIEW_1970_S: f64 = 2_082_844_800.0;
+/// No measurement is later, s since 1970: 2060.
+const LATEST_S: f64 = 2_840_140_800.0;
+
+fn is_measured(time_s: f64) -> bool {
+    (MEASURED_S[0]..MEASURED_S[1]).contains(&time_s)
+}
+
+/// What is doubtful about a column of times whose first number looks like seconds since 1904.
+///
+/// # Errors
+/// With the cell and the remedy, where the numbers are counts of 100 ns from another day.
+pub fn check(time: &Known, first: f64) -> Result<Option<String>> {
+    let (name, cell) = (shown(&time.name), shown(&time.first));
+    for (what, year, of_1970) in TICKS {
+        if is_measured((first - of_1970) / TICKS_A_SECOND) {
+            bail!(
+                "column \"{name}\": \"{cell}\": looks like {what}, of 100 ns since the year {year}: write seconds since the first row, or state their unit in a map (units)"
+            );
+        }
+    }
+    let is_labview = first > LATEST_S && is_measured(first - LABVIEW_1970_S);
+    Ok(is_labview.then(|| {
+        format!(
+            "column \"{name}\": \"{cell}\": looks like seconds since 1904, as LabVIEW writes them, and was read as seconds since 1970: subtract {LABVIEW_1970_S} for the date"
+        )
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::recognise::{Role, of_text};
+    use super::*;
+
+    fn checked(first: f64) -> Result<Option<String>> {
+        let text = format!("time,z_um\n{first},0.1\n{},0.2\n", first + 60.0);
+        let found = of_text(&text).unwrap().unwrap();
+        check(found.first(Role::Time).unwrap(), first)
+    }
+
+    #[test]
+    fn counts_from_other_days_are_named_and_those_from_1970_are_taken() {
+        // The second: Python, (datetime(2026, 1, 5, 8) - datetime(1, 1, 1)) and - datetime(1601, 1, 1), in 100 ns.
+        for first in [
+            629_000_000_000_000_000.0 + 4e15,
+            639_031_968_000_000_000.0,
+            643_400_000_000_000_000.0,
+        ] {
+            let refused = checked(first).unwrap_err().to_string();
+            assert!(refused.contains("ticks of .NET"), "{refused}");
+        }
+        for first in [134_120_736_000_000_000.0, 129_000_000_000_000_000.0] {
+            let refused = checked(first).unwrap_err().to_string();
+            assert!(refused.contains("file times of Windows"), "{refused}");
+        }
+        for first in [3_850_444_800.0, 3_500_000_000.0] {
+            let said = checked(first).unwrap().unwrap();
+            assert!(said.contains("subtract 2082844800"), "{said}");
+        }
+        // 2026 since 1970 in s, ms, us and ns, and times from zero.
+        for first in [
+            1_767_600_000.0,
+            1_767_600_000e3,
+            1_767_600_000e6,
+            1_767_600_000e9,
+            0.0,
+            45_000.0,
+        ] {
+            assert_eq!(checked(first).unwrap(), None, "{first}");
+        }
+    }
+}

@@ -1,0 +1,262 @@
+//! Words by which the name of a column of numbers is that of a quantity, and those that make another one of it.
+
+use super::pass_names::axis_of;
+use super::recognise::Role;
+use super::units::Unit;
+
+/// What a column of numbers holds by a word of its name: by the word's begin, or as a whole. The first that fits holds.
+const ROLE_WORDS: [(Role, &[&str], &[&str]); 9] = [
+    (Role::Temperature, &["temp", "therm"], &[]),
+    (
+        Role::Time,
+        &["time", "zeit", "stamp", "epoch"],
+        &["t", "date", "datum"],
+    ),
+    (Role::Radial, &["radial", "radius", "ballbar"], &[]),
+    (Role::Angle, &["angle", "winkel", "theta", "phi"], &[]),
+    (
+        Role::Deviation,
+        &["dev", "err", "abweich", "fehler", "diff", "delta"],
+        &[],
+    ),
+    (
+        Role::Measured,
+        &["measur", "actual", "reading", "mess"],
+        &["ist", "istwert", "laser"],
+    ),
+    (
+        Role::Target,
+        &["target", "soll", "nominal", "position", "command", "ziel"],
+        &["pos"],
+    ),
+    (
+        Role::Run,
+        &["run", "cycle", "lauf", "zyklus", "pass"],
+        &["nr", "no", "n"],
+    ),
+    (
+        Role::Displacement,
+        &["displ", "drift", "growth", "weg"],
+        &["x", "y", "z"],
+    ),
+];
+/// Begins of words of statistics, limits, other errors and what was worked out: a reading is none of them.
+const OF_NO_READING: &[&str] = &[
+    "limit",
+    "grenz",
+    "toleran",
+    "threshold",
+    "allow",
+    "permiss",
+    "zuläss",
+    "zulaess",
+    "specif",
+    "mean",
+    "averag",
+    "mittel",
+    "moyenn",
+    "media",
+    "sigma",
+    "stdev",
+    "stddev",
+    "varianc",
+    "range",
+    "spread",
+    "spannweite",
+    "minimum",
+    "maximum",
+    "uncertain",
+    "unsicher",
+    "straight",
+    "geradheit",
+    "flat",
+    "ebenheit",
+    "squareness",
+    "parallel",
+    "filter",
+    "gefilter",
+    "smooth",
+    "geglätt",
+    "fitted",
+    "repeatab",
+    "hysteres",
+    "reversal",
+    "umkehr",
+];
+/// Other such words, whole.
+const OF_NO_READING_WHOLE: &[&str] = &[
+    "tol", "avg", "ave", "std", "rms", "min", "max", "fit", "spec", "ucl", "lcl", "usl", "lsl",
+    "yaw", "roll", "sd", "2s", "3s",
+];
+/// Roles that a statistic or a limit has none of.
+const OF_READINGS: [Role; 5] = [
+    Role::Radial,
+    Role::Deviation,
+    Role::Measured,
+    Role::Target,
+    Role::Displacement,
+];
+/// Words that make no other quantity of one.
+const PLAIN: &[&str] = &[
+    "axis", "achse", "value", "wert", "of", "the", "in", "point", "punkt", "no", "nr",
+];
+
+/// Whether a word is one of a role.
+fn is_of(role: Role, word: &str) -> bool {
+    let own = ROLE_WORDS.iter().find(|(other, ..)| *other == role);
+    own.is_some_and(|(_, begins, whole)| {
+        whole.contains(&word) || begins.iter().any(|begin| word.starts_with(begin))
+    })
+}
+
+/// Whether words of a name are those of a statistic, a limit or what was worked out of readings.
+fn is_no_reading(words: &[String]) -> bool {
+    words.iter().any(|word| {
+        OF_NO_READING_WHOLE.contains(&word.as_str())
+            || OF_NO_READING.iter().any(|begin| word.starts_with(begin))
+    })
+}
+
+/// What a column of numbers holds by the words of its name; one of a length without others holds a displacement.
+pub fn of(words: &[String], is_length: bool) -> Option<Role> {
+    let mut roles = ROLE_WORDS.iter().map(|(role, ..)| *role);
+    let named = roles.find(|role| words.iter().any(|word| is_of(*role, word)));
+    let role = named.or_else(|| is_length.then_some(Role::Displacement))?;
+    (!OF_READINGS.contains(&role) || !is_no_reading(words)).then_some(role)
+}
+
+/// How many words of a name qualify the quantity of its role.
+pub fn n_qualifiers(words: &[String], role: Role) -> usize {
+    let is_number = |word: &str| word.chars().all(|letter| letter.is_ascii_digit());
+    let is_plain = |word: &str| {
+        is_of(role, word)
+            || PLAIN.contains(&word)
+            || Unit::of_word(word).is_some()
+            || is_number(word)
+            || axis_of(word).is_some()
+    };
+    words.iter().filter(|word| !is_plain(word.as_str())).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::recognise::of_text;
+    use super::*;
+
+    /// The column that is taken as one of a role, and others that fit as well.
+    fn taken(head: &str, role: Role) -> (Option<String>, Vec<String>) {
+        let n = head.split(',').count();
+        let row = |k: usize| {
+            let cells = (0..n).map(|column| format!("{}.{k}", 7 * column + k));
+            cells.collect::<Vec<_>>().join(",")
+        };
+        let rows: Vec<String> = (1..5).map(row).collect();
+        let found = of_text(&format!("{head}\n{}\n", rows.join("\n")));
+        let found = found.unwrap().unwrap();
+        let first = found.first(role).map(|column| column.name.clone());
+        let others = found.first(role).map(|column| found.as_plain(column));
+        let others = others
+            .into_iter()
+            .flatten()
+            .map(|column| column.name.clone());
+        (first, others.collect())
+    }
+
+    #[test]
+    fn the_plain_name_is_taken_before_one_that_says_more() {
+        for (role, plain, others) in [
+            (
+                Role::Deviation,
+                "deviation um",
+                "deviation limit um;straightness deviation um;mean deviation um;error compensated (um);error tolerance;max error um;filtered deviation;std error;corrected deviation um",
+            ),
+            (
+                Role::Displacement,
+                "z um",
+                "z limit um;mean z um;z um (filtered);smoothed z um;sensor z um;z max um",
+            ),
+            (
+                Role::Radial,
+                "radial um",
+                "filtered radial um;radial mean um;radial limit um;raw radial um",
+            ),
+            (
+                Role::Measured,
+                "measured mm",
+                "mean measured mm;measured limit mm;measured filtered mm",
+            ),
+            (
+                Role::Target,
+                "target mm",
+                "target limit mm;old target mm;target tolerance mm",
+            ),
+        ] {
+            for other in others.split(';') {
+                for head in [format!("n,{other},{plain}"), format!("n,{plain},{other}")] {
+                    let wanted = (Some(plain.to_owned()), vec![]);
+                    assert_eq!(taken(&head, role), wanted, "{head}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_limit_a_mean_and_a_straightness_are_none_of_the_quantity() {
+        for name in [
+            "straightness deviation um",
+            "deviation limit um",
+            "mean error um",
+            "Mittelwert Abweichung",
+            "Geradheitsabweichung um",
+            "error tolerance [um]",
+            "filtered deviation um",
+            "deviation uncertainty um",
+            "squareness error",
+            "range of deviation um",
+        ] {
+            assert_eq!(
+                taken(&format!("n,{name},k"), Role::Deviation).0,
+                None,
+                "{name}"
+            );
+        }
+        for name in [
+            "z limit um",
+            "mean z um",
+            "filtered um",
+            "z um (filtered)",
+            "z (mean) um",
+        ] {
+            assert_eq!(
+                taken(&format!("n,{name},k"), Role::Displacement).0,
+                None,
+                "{name}"
+            );
+        }
+    }
+
+    #[test]
+    fn of_two_that_fit_as_well_the_other_is_named() {
+        for (role, head, other) in [
+            (Role::Displacement, "time_s,x1_um,x2_um", "x2_um"),
+            (
+                Role::Deviation,
+                "target_mm,deviation um,error um",
+                "error um",
+            ),
+            (
+                Role::Deviation,
+                "target_mm,raw error um,final error um",
+                "final error um",
+            ),
+            (Role::Radial, "angle_deg,radial um,ballbar um", "ballbar um"),
+        ] {
+            assert_eq!(taken(head, role).1, [other], "{head}");
+        }
+        assert!(
+            taken("run,target_mm,deviation_um", Role::Deviation)
+                .1
+                .is_empty()
+        );
+    }
+}

@@ -1,0 +1,65 @@
+//! Columns that a test needs by their names, whose cells are no numbers: which cell stands in the way.
+
+use metrology::yaml::shown;
+
+use super::recognise::{Recognised, Role, role_of_name};
+use super::sheet::Sheet;
+
+/// Names of quantities that a line of names has at least.
+const LEAST_NAMES: usize = 2;
+
+/// Whether a cell has a digit of any script.
+pub fn has_digit(cell: &str) -> bool {
+    cell.contains(char::is_numeric)
+}
+
+/// The line of names above cells of which hardly one is a number.
+pub fn head(lines: &[(u64, Vec<String>)]) -> Option<usize> {
+    let is_quantity = |cell: &&String| {
+        let role = role_of_name(cell);
+        let is_name = cell.chars().next().is_some_and(char::is_alphabetic);
+        is_name && role.is_some_and(|role| role != Role::Run)
+    };
+    lines.windows(2).position(|two| {
+        let [(_, names), (_, below)] = two else {
+            return false;
+        };
+        names.iter().filter(is_quantity).count() >= LEAST_NAMES
+            && below.iter().filter(|cell| has_digit(cell)).count() >= LEAST_NAMES
+            && !below.iter().any(|cell| is_quantity(&cell))
+    })
+}
+
+/// Whether cells have commas before decimals: not three digits alone behind each, as thousands have.
+pub fn has_decimal_commas(sheet: &Sheet) -> bool {
+    let mut cells = sheet.lines.iter().flat_map(|(_, cells)| cells);
+    cells.any(|cell| {
+        cell.split_once(',').is_some_and(|(whole, decimals)| {
+            let is_digit = |letter: char| letter.is_ascii_digit();
+            whole.ends_with(is_digit)
+                && !decimals.is_empty()
+                && decimals.len() != 3
+                && decimals.chars().all(is_digit)
+        })
+    })
+}
+
+/// A sentence for each column that is a quantity by its name and has cells that are no numbers; none without any.
+pub fn in_words(found: &Recognised) -> Option<String> {
+    let columns = found.columns.iter().filter_map(|column| {
+        let role = role_of_name(&column.name).filter(|role| *role != Role::Run)?;
+        let (line, cell) = column.odd.as_ref().filter(|_| column.role != Some(role))?;
+        let remedy = if cell.contains(',') && found.decimal == '.' {
+            "; with decimal commas the map needs `decimal: \",\"`"
+        } else {
+            ""
+        };
+        Some(format!(
+            "line {line}, column \"{}\": \"{}\": must be a number{remedy}",
+            shown(&column.name),
+            shown(cell)
+        ))
+    });
+    let lines: Vec<String> = columns.collect();
+    (!lines.is_empty()).then(|| lines.join("; "))
+}
