@@ -22,8 +22,6 @@ pub use page::Table;
 
 /// The report, where the diagnosis may write.
 const REPORT: &str = "told/gap.json";
-/// Done, and done with a part of the input left out.
-const DONE: [i32; 2] = [0, 3];
 
 /// A report with its page, or the reason why the session was refused.
 type Reported = Result<(GapReport, String), String>;
@@ -109,11 +107,7 @@ fn imported(folder: &Path, names: &[&str]) -> Result<Result<(), String>> {
             .stdin(Stdio::null())
             .output()
             .context("abbe import")?;
-        if !output
-            .status
-            .code()
-            .is_some_and(|code| DONE.contains(&code))
-        {
+        if !blind::is_done(output.status) {
             let told = String::from_utf8_lossy(&output.stderr).trim().to_owned();
             return Ok(Err(format!("import: {told}")));
         }
@@ -130,11 +124,7 @@ fn diagnosed(folder: &Path, names: &[&str]) -> Result<Reported> {
         .args(["--machine", "machine.yaml", "--json", REPORT, "--full"])
         .output()
         .context("abbe diagnose")?;
-    if !output
-        .status
-        .code()
-        .is_some_and(|code| DONE.contains(&code))
-    {
+    if !blind::is_done(output.status) {
         let told = String::from_utf8_lossy(&output.stderr).trim().to_owned();
         return Ok(Err(format!("diagnose: {told}")));
     }

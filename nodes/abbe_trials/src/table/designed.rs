@@ -1,5 +1,6 @@
 //! Arms of designed programmes: by minutes and physics, by class, by second rounds; and the lines that their page begins with.
 
+use metrology::number::decimals_of;
 use reports::section::{Rows, Section, head};
 use trials::Arm;
 use trials::designed::{Overview, PROGRAMME_MIN, ProgrammeLine, RoundsLine, SizeLine};
@@ -105,7 +106,7 @@ fn size(line: &SizeLine) -> Vec<String> {
     cells.extend(line.not_shown.map(count));
     cells.extend(
         line.size
-            .map(|size| size.map_or_else(|| "-".to_owned(), |size| format!("{size:.2}"))),
+            .map(|size| size.map_or_else(|| "-".to_owned(), two_digits)),
     );
     cells.push(line.unit.clone());
     cells
@@ -224,18 +225,34 @@ fn figure(targets: &[Target], metric: &str) -> String {
     percent(count.unwrap_or_default())
 }
 
+/// A size with two significant digits: those of a lag are thousandths.
+fn two_digits(size: f64) -> String {
+    format!("{size:.*}", decimals_of(size))
+}
+
 /// Sizes of some classes with a D of 20, at one of the minutes.
 fn sizes(overview: Option<&Overview>, minutes: usize) -> String {
     let told = IN_WORDS.iter().filter_map(|(id, words)| {
         let mut lines = overview?.sizes.iter();
         let line = lines.find(|line| line.class.id() == *id)?;
         let size = line.size.get(minutes).copied().flatten()?;
-        Some(format!("{words} {size:.2} {}", line.unit))
+        Some(format!("{words} {} {}", two_digits(size), line.unit))
     });
     let told: Vec<String> = told.collect();
     if told.is_empty() {
         NOT_TRIED.to_owned()
     } else {
         told.join(", ")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_of_any_magnitude_have_two_digits() {
+        let told = [0.003_17, 0.584, 8.37, 61.2].map(two_digits);
+        assert_eq!(told, ["0.0032", "0.58", "8.4", "61"]);
     }
 }
