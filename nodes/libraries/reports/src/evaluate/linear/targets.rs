@@ -105,7 +105,8 @@ pub(in crate::evaluate) fn left_out(
                 }
             }
         }
-        if let (false, [at]) = (flaws.is_empty(), places.at(&[*place])[..]) {
+        let at = places.at(&[*place]);
+        if let (false, Some(at)) = (flaws.is_empty(), at.first()) {
             lines.push(format!("{at:.3} {unit}: {}", shortened(&flaws)));
         }
     }
