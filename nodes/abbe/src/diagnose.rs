@@ -341,6 +341,7 @@ fn beside(
     let remarks = recorded.remarks.into_iter().chain(leaps);
     Ok(Diagnosed {
         diagnosis,
+        omitted: recorded.omitted,
         remarks: remarks.chain(of_simulator).collect(),
         readings: recorded.readings,
         defaults,

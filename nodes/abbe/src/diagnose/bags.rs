@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use abbe_msgs::topics;
 use anyhow::{Context, Result, anyhow, bail};
 use gap_diagnosis::report;
-use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
+use gap_diagnosis::session::{self, Account, Input, SessionBuilder, SessionConfig};
 use machine::MachineFile;
 use machine::file::AxisEntry;
 use metrology::text::{self, Comments};
@@ -21,7 +21,9 @@ pub struct Recorded {
     pub session: Session,
     /// Each bag with its hash and counts.
     pub bags: Vec<report::Bag>,
-    /// What was left out, in words.
+    /// What of the runs could not be used, in words.
+    pub omitted: Vec<String>,
+    /// What was left out and is no loss, in words.
     pub remarks: Vec<String>,
     /// What of each bag was read, lost and left out.
     pub readings: Vec<Reading>,
@@ -91,10 +93,23 @@ impl Recorded {
         Ok(Self {
             session,
             bags,
-            remarks: account.remarks().collect(),
+            omitted: omitted(&account, &readings),
+            remarks: account.notes().collect(),
             readings,
         })
     }
+}
+
+/// What of the runs could not be used; states of another machine are in the account of the bag already.
+fn omitted(account: &Account, readings: &[Reading]) -> Vec<String> {
+    let topics = readings.iter().flat_map(|it| &it.account.topics);
+    let mut left_out = topics.flat_map(|it| &it.left_out);
+    let is_known = left_out.any(|it| it.reason == Reason::OtherMachine);
+    let mut account = account.clone();
+    if is_known {
+        account.left_out.remove(&session::Reason::OtherMachine);
+    }
+    account.losses().collect()
 }
 
 /// What bags lack may have been in what was lost of them, which is said first.

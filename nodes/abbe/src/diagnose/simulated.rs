@@ -50,9 +50,8 @@ pub fn beside(
     }
     let (session, matched) =
         simulated::beside(machine, &recorded.session, &read.session).context("--simulated")?;
-    let remarks = read
-        .remarks
-        .iter()
+    let remarks = { read.omitted.iter() }
+        .chain(&read.remarks)
         .map(|line| format!("--simulated: {line}"));
     Ok(Some(Beside {
         session,

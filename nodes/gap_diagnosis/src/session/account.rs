@@ -61,6 +61,35 @@ pub enum Reason {
 }
 
 impl Reason {
+    /// Whether something could not be used that the recording should have had. What was not completed, no method
+    /// uses or is used all the same is no loss: runs that the machine broke off, readings with a turned rotary axis, segments
+    /// and clocks that came otherwise.
+    #[must_use]
+    pub const fn is_loss(self) -> bool {
+        match self {
+            Self::NotFinite
+            | Self::OtherMachine
+            | Self::WentBack
+            | Self::ToldBefore
+            | Self::InGap
+            | Self::HoleInMotion
+            | Self::Beyond
+            | Self::OtherZero
+            | Self::Stuck
+            | Self::StuckInPart
+            | Self::UnknownFeature
+            | Self::Cut
+            | Self::NotBegun
+            | Self::TooLong
+            | Self::TooMuch => true,
+            Self::ClockJump
+            | Self::RotaryTurned
+            | Self::Failed
+            | Self::SegmentLate
+            | Self::CompensationHeld => false,
+        }
+    }
+
     /// What a person is told, after a number.
     #[must_use]
     pub const fn text(self) -> &'static str {
@@ -118,8 +147,22 @@ impl Account {
 
     /// What was left out, in words.
     pub fn remarks(&self) -> impl Iterator<Item = String> {
-        self.left_out
-            .iter()
-            .map(|(reason, n)| format!("{n} {}", reason.text()))
+        self.lines(|_| true)
+    }
+
+    /// What of it is a loss of the recording, in words.
+    pub fn losses(&self) -> impl Iterator<Item = String> {
+        self.lines(Reason::is_loss)
+    }
+
+    /// What of it is none.
+    pub fn notes(&self) -> impl Iterator<Item = String> {
+        self.lines(|reason| !reason.is_loss())
+    }
+
+    fn lines(&self, is_wanted: fn(Reason) -> bool) -> impl Iterator<Item = String> {
+        let wanted = self.left_out.iter();
+        let wanted = wanted.filter(move |(reason, _)| is_wanted(**reason));
+        wanted.map(|(reason, n)| format!("{n} {}", reason.text()))
     }
 }

@@ -11,7 +11,9 @@ use crate::loss;
 pub struct Diagnosed {
     /// What was found.
     pub diagnosis: Diagnosis,
-    /// What was left out, in words.
+    /// What of the runs could not be used, in words.
+    pub omitted: Vec<String>,
+    /// What was left out and is no loss, in words.
     pub remarks: Vec<String>,
     /// What of each bag was read, lost and left out.
     pub readings: Vec<Reading>,
@@ -28,7 +30,9 @@ pub struct Diagnosed {
 impl Diagnosed {
     /// What was lost or left out, in words.
     pub fn losses(&self) -> Vec<String> {
-        loss::lines(&self.readings)
+        let mut lines = loss::lines(&self.readings);
+        lines.extend(self.omitted.iter().cloned());
+        lines
     }
 
     /// The report as JSON. What was lost or left out is a key of its own, where there is any, and so are defaults in use.
@@ -37,8 +41,11 @@ impl Diagnosed {
     /// When a number has no place in JSON.
     pub fn json(&self) -> Result<serde_json::Value> {
         let mut report = serde_json::to_value(&self.diagnosis.report)?;
-        if self.readings.iter().any(|reading| !reading.is_whole()) {
-            report["loss"] = self.readings.iter().map(loss::as_json).collect();
+        if !self.losses().is_empty() {
+            let bags = self.readings.iter().map(loss::as_json);
+            let of_runs = (!self.omitted.is_empty())
+                .then(|| serde_json::json!({ "omitted_of_runs": self.omitted }));
+            report["loss"] = bags.chain(of_runs).collect();
         }
         if !self.defaults.is_empty() {
             report["machine_defaults"] = self.defaults.as_slice().into();
