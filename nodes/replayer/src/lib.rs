@@ -31,6 +31,7 @@ pub mod reading;
 mod repeats;
 mod replay;
 mod stamps;
+mod turned;
 mod usable;
 
 pub use account::{Account, LeftOut, Place, Reason, TopicAccount};

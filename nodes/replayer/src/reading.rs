@@ -12,6 +12,7 @@ use crate::known::{entry_in_any_namespace, unreadable};
 use crate::leap::Leaps;
 use crate::repeats::{self, Repeats};
 use crate::stamps::WrongStamps;
+use crate::turned::{Held, Turn, Turned};
 use crate::usable;
 
 /// What became of a bag that was read.
@@ -59,14 +60,17 @@ pub struct Taken<'a> {
     entry: &'static Entry,
     message: MessageRef<'a>,
     row: &'a mut TopicAccount,
+    /// Its number among the messages of its topic, from 1.
+    number: u64,
     /// Whether it was decoded and counted: who reads it again counts nothing.
     is_counted: bool,
 }
 
 /// Reads `bag` in an order and hands on every message of the topics `wanted` (their names in
 /// [`abbe_msgs::topics`]), in whatever namespace they are; repeated messages (`repeats`), messages with wrong stamps (`stamps`)
-/// and outliers of thermometers (`outliers`) are left out and counted.
-pub fn read(bag: &Bag, order: Order, wanted: &[&str], mut take: impl FnMut(Taken<'_>)) -> Reading {
+/// and outliers of thermometers (`outliers`) are left out and counted. A begin of a run before the end of the last one at one log
+/// time is handed on behind it (`turned`).
+pub fn read(bag: &Bag, order: Order, wanted: &[&str], take: impl FnMut(Taken<'_>)) -> Reading {
     let mut reading = Reading {
         losses: bag.description_losses().to_vec(),
         ..Reading::default()
@@ -81,9 +85,15 @@ pub fn read(bag: &Bag, order: Order, wanted: &[&str], mut take: impl FnMut(Taken
     } else {
         WrongStamps::default()
     };
+    let mut reader = Reader {
+        rows,
+        wrong_stamps,
+        passed: Repeats::default(),
+        turned: Turned::default(),
+        take,
+    };
     let mut messages = bag.messages(order);
     let mut before = None;
-    let mut passed = Repeats::default();
     while let Some(event) = messages.next_event() {
         let message = match event {
             Event::Message(message) => message,
@@ -94,37 +104,81 @@ pub fn read(bag: &Bag, order: Order, wanted: &[&str], mut take: impl FnMut(Taken
         };
         let at = message.log_time_nanos;
         reading.leaps.pass(before.replace(at).unwrap_or(at), at);
-        match &plans[message.topic.index()] {
+        let overdue = reader.turned.overdue(at);
+        reader.hand_on(overdue);
+        reader.message(&plans[message.topic.index()], message);
+    }
+    let held = reader.turned.rest();
+    reader.hand_on(held);
+    reading
+}
+
+/// Reads one message after another.
+struct Reader<'r, F> {
+    rows: &'r mut Vec<TopicAccount>,
+    wrong_stamps: WrongStamps,
+    passed: Repeats,
+    turned: Turned,
+    take: F,
+}
+
+impl<F: FnMut(Taken<'_>)> Reader<'_, F> {
+    fn message(&mut self, plan: &Plan, message: MessageRef<'_>) {
+        match plan {
             Plan::Aside => {}
             Plan::LeftOut {
                 place,
                 reason,
                 what,
             } => {
-                let row = &mut rows[*place];
+                let row = &mut self.rows[*place];
                 row.messages += 1;
                 let first = place_of(row.messages, &message, None);
                 row.leave_out(*reason, first, || what.clone());
             }
             Plan::Read { place, entry } => {
-                let row = &mut rows[*place];
+                let row = &mut self.rows[*place];
                 row.messages += 1;
-                if let Some((reason, what)) = misplaced(&wrong_stamps, &mut passed, &message, entry)
-                {
-                    let first = place_of(row.messages, &message, Some(&row.type_name));
+                let number = row.messages;
+                let misplaced = misplaced(&self.wrong_stamps, &mut self.passed, &message, entry);
+                if let Some((reason, what)) = misplaced {
+                    let first = place_of(number, &message, Some(&row.type_name));
                     row.leave_out(reason, first, || what);
-                    continue;
+                    return;
                 }
-                take(Taken {
+                let turn = self.turned.take(&message, entry, (*place, number));
+                if turn == Turn::Later {
+                    return;
+                }
+                (self.take)(Taken {
                     entry,
                     message,
                     row,
+                    number,
                     is_counted: false,
                 });
+                if turn == Turn::BeforeHeld {
+                    let held = self.turned.rest();
+                    self.hand_on(held);
+                }
             }
         }
     }
-    reading
+
+    /// Hands on a message that was held.
+    fn hand_on(&mut self, held: Option<Held>) {
+        if let Some(held) = held
+            && let Some(row) = self.rows.get_mut(held.place)
+        {
+            (self.take)(Taken {
+                entry: held.entry,
+                message: held.message(),
+                row,
+                number: held.number,
+                is_counted: false,
+            });
+        }
+    }
 }
 
 /// Why a message that can be read is left out all the same: it is repeated, of another time, or an outlier.
@@ -206,7 +260,7 @@ impl Taken<'_> {
     #[must_use]
     pub fn place(&self) -> Place {
         let type_name = self.row.type_name.as_str();
-        place_of(self.row.messages, &self.message, Some(type_name))
+        place_of(self.number, &self.message, Some(type_name))
     }
 
     /// Counts it, which was decoded, as one that cannot be used.
@@ -239,7 +293,7 @@ impl Taken<'_> {
             }
             Err(_) if is_counted => None,
             Err(error) => {
-                let first = place_of(self.row.messages, &self.message, Some(M::TYPE_NAME));
+                let first = place_of(self.number, &self.message, Some(M::TYPE_NAME));
                 let reason = error.defect().into();
                 self.row.leave_out(reason, first, || error.to_string());
                 None
