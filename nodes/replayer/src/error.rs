@@ -26,6 +26,10 @@ pub enum ReplayError {
         "resumed after {after_messages} messages: the bag has {messages}, so nothing would be resumed"
     )]
     ResumedAfterEnd { after_messages: u64, messages: u64 },
+    #[error(
+        "resumed after {after_messages} messages: no input of the bag follows, so nothing would be resumed: name fewer messages"
+    )]
+    ResumedAfterInputs { after_messages: u64 },
     #[error(transparent)]
     Compose(#[from] ComposeError),
     #[error(transparent)]

@@ -110,6 +110,8 @@ struct Replay<'b> {
     /// Messages that are repeated: those who made the bag did not count them.
     repeated: u64,
     relays: VecDeque<Relay>,
+    /// The last relay's turn: after how many messages, and how many inputs had been put in by then.
+    resumed: Option<(u64, u64)>,
     start: Stamp<Host>,
     stop: Option<Stamp<Host>>,
     /// An input was lost or left out, or the log times leaped: what differs from here on may come of that.
@@ -122,8 +124,7 @@ struct Replay<'b> {
 /// turn comes.
 ///
 /// # Errors
-/// When the bag is not of a composed run; when a node's state cannot be handed on, or the bag ends before a relay's
-/// turn.
+/// When the bag is not of a composed run; when a node's state cannot be handed on, or no input follows a relay's turn.
 pub fn check(
     bag: &Bag,
     run: &RecordedRun,
@@ -160,6 +161,7 @@ pub fn check(
         passed: Repeats::numbered(),
         repeated: 0,
         relays: relays.into(),
+        resumed: None,
         start: stamp(run.start_time_nanos),
         stop: run.stop_time_nanos.map(stamp),
         is_doubtful: false,
@@ -299,12 +301,17 @@ impl Replay<'_> {
             self.go_on(|due| due <= end);
             self.nothing_is_left();
         }
-        match self.relays.front() {
-            Some(&Relay { after_messages, .. }) => Err(ReplayError::ResumedAfterEnd {
+        if let Some(&Relay { after_messages, .. }) = self.relays.front() {
+            return Err(ReplayError::ResumedAfterEnd {
                 after_messages,
                 messages: read,
-            }),
-            None => Ok(()),
+            });
+        }
+        match self.resumed {
+            Some((after_messages, inputs)) if inputs == self.outcome.inputs => {
+                Err(ReplayError::ResumedAfterInputs { after_messages })
+            }
+            _ => Ok(()),
         }
     }
 
@@ -420,6 +427,7 @@ impl Replay<'_> {
         while self.relays.front().is_some_and(has_turn)
             && let Some(relay) = self.relays.pop_front()
         {
+            self.resumed = Some((relay.after_messages, self.outcome.inputs));
             let snapshot = self.harness.save()?;
             let mut fresh = Harness::compose(computing(relay.nodes), Stamp::from_nanos(0))?;
             fresh.resume(&snapshot)?;
