@@ -14,6 +14,9 @@ const LARGEST_JSON: u64 = 256 << 20;
 /// Bytes at the begin of a page that show its kind.
 const HEAD: u64 = 1024;
 
+/// What describes a bag in its folder.
+const DESCRIPTION: &str = "metadata.yaml";
+
 /// What stands for standard output where an option can print; those that reach [`check_outputs`] cannot.
 const STANDARD_OUTPUT: &str = "-";
 
@@ -74,6 +77,12 @@ pub fn check_outputs<'p>(
         if inputs.iter().any(|input| is_same(input, &at)) {
             bail!("{}: is read as an input: name another file", output.shown());
         }
+        if is_part_of_bag(&at, &inputs) {
+            bail!(
+                "{}: a bag's own folder is read with every *.mcap in it: name a file elsewhere",
+                output.shown()
+            );
+        }
         if let Some((_, other)) = places.iter().find(|(other, _)| is_same(other, &at)) {
             bail!(
                 "{}: {} writes there too: name two files",
@@ -85,6 +94,15 @@ pub fn check_outputs<'p>(
         places.push((at, output));
     }
     Ok(())
+}
+
+/// Whether a new file would be read as a part of a bag.
+fn is_part_of_bag(at: &Path, inputs: &[PathBuf]) -> bool {
+    let is_mcap = at.extension().is_some_and(|it| it == "mcap");
+    let of_bag = |folder: &Path| {
+        inputs.iter().any(|input| input == folder) || folder.join(DESCRIPTION).is_file()
+    };
+    is_mcap && at.parent().is_some_and(of_bag)
 }
 
 /// A path without links, also of a file that is not there yet.
@@ -208,6 +226,29 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn a_file_that_would_be_a_part_of_a_bag_is_refused() {
+        let home = tempfile::tempdir().unwrap();
+        let [bag, other] = ["bag", "other"].map(|name| home.path().join(name));
+        for folder in [&bag, &other] {
+            std::fs::create_dir(folder).unwrap();
+        }
+        std::fs::write(other.join("metadata.yaml"), "").unwrap();
+        let said = |path: PathBuf| {
+            let output = Output::new("--json", path, Form::Json);
+            refusal(&[output], &[&bag])
+        };
+        for folder in [&bag, &other] {
+            let refused = said(folder.join("x.mcap")).unwrap();
+            assert!(
+                refused.contains("is read with every *.mcap in it"),
+                "{refused}"
+            );
+            assert_eq!(said(folder.join("x.json")), None);
+        }
+        assert_eq!(said(home.path().join("x.mcap")), None);
     }
 
     #[test]
