@@ -196,7 +196,11 @@ impl Export {
         if selected.files.is_empty() {
             let bag = self.bag.display();
             complain!("abbe: {bag}: nothing to export; looked for");
-            for line in looked_for(&measured, (topics, &reading), self.axes()) {
+            for line in looked_for(
+                &measured,
+                (topics, &reading),
+                (self.axes(), &origin.of_references),
+            ) {
                 complain!("  {line}");
             }
             for loss in &losses {

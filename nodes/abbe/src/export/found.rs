@@ -124,7 +124,7 @@ fn is_left_out(topic: &str, reading: &Reading) -> bool {
 pub(super) fn looked_for(
     measured: &Measured,
     (topics, reading): ([Option<u64>; 4], &Reading),
-    axes: AxisSet,
+    (axes, of_references): (AxisSet, &PerAxis<Option<String>>),
 ) -> Vec<String> {
     let of_axes = |known: AxisSet| {
         let names: Vec<String> = known.iter().map(|axis| axis.to_string()).collect();
@@ -133,10 +133,14 @@ pub(super) fn looked_for(
             names.join(" ")
         )
     };
-    let tables: AxisSet = Axis::ALL
-        .into_iter()
-        .filter(|axis| measured.tables[*axis].is_some())
-        .collect();
+    let have = |is_known: &dyn Fn(Axis) -> bool| -> AxisSet {
+        Axis::ALL
+            .into_iter()
+            .filter(|axis| is_known(*axis))
+            .collect()
+    };
+    let tables = have(&|axis| measured.tables[axis].is_some() && of_references[axis].is_none());
+    let references = have(&|axis| of_references[axis].is_some());
     let wanted: Vec<String> = axes.iter().map(|axis| axis.to_string()).collect();
     let mut lines: Vec<String> = TABLE_TOPICS
         .iter()
@@ -159,9 +163,14 @@ pub(super) fn looked_for(
         })
         .collect();
     lines.push(format!("for axes {}", wanted.join(" ")));
-    lines.push(
-        "runs of a length or angular reference along one axis with nothing added to its commands: none with targets that every run stopped at".to_owned(),
-    );
+    let of_runs = if references.is_empty() {
+        "none with targets that every run stopped at".to_owned()
+    } else {
+        of_axes(references)
+    };
+    lines.push(format!(
+        "runs of a length or angular reference along one axis with nothing added to its commands: {of_runs}"
+    ));
     lines.push("stops of verifications along one axis count with --stops alone".to_owned());
     lines
 }

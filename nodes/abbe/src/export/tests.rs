@@ -8,6 +8,8 @@ use recorder::{Channel, Directory, MessageStamp, RecorderConfig, Recording};
 
 use super::*;
 use control_tables::Travels;
+use control_tables::selection::Measured;
+use replayer::Reading;
 
 #[derive(Parser)]
 struct CommandLine {
@@ -79,6 +81,22 @@ fn execute(bag: &Path, out: &Path, more: &[&str]) -> Result<ExitCode> {
 
 fn code(result: Result<ExitCode>) -> String {
     format!("{:?}", result.unwrap())
+}
+
+#[test]
+fn runs_of_a_reference_that_no_table_was_made_of_are_not_said_to_be_missing() {
+    let mut of_references = PerAxis::default();
+    of_references[Axis::X] = Some("positioning of X".to_owned());
+    let reading = Reading::default();
+    let lines = |known: &PerAxis<Option<String>>| {
+        let axes = (AxisSet::EMPTY.with(Axis::X), known);
+        let lines = looked_for(&Measured::default(), ([None; 4], &reading), axes);
+        lines.join("\n")
+    };
+    let told = lines(&of_references);
+    let words = "added to its commands: it is about X, what of that is in no table is said above";
+    assert!(told.contains(words), "{told}");
+    assert!(lines(&PerAxis::default()).contains("none with targets that every run stopped at"));
 }
 
 #[test]
@@ -321,7 +339,9 @@ fn nothing_to_export_names_each_source_and_why_it_gave_none() {
     let found = read(&Bag::open(&bag).unwrap(), Which::Last);
     assert_eq!(found.topics, [Some(1), None, None, None]);
     let topics = (found.topics, &found.reading);
-    let lines = looked_for(&found.measured, topics, AxisSet::EMPTY.with(Axis::Z));
+    let none = PerAxis::default();
+    let axes = (AxisSet::EMPTY.with(Axis::Z), &none);
+    let lines = looked_for(&found.measured, topics, axes);
     assert!(lines[0].contains("positioning/table"), "{lines:?}");
     assert!(lines[0].contains("it is about X"), "{lines:?}");
     for line in &lines[1..4] {
@@ -339,7 +359,9 @@ fn a_topic_of_which_every_message_was_left_out_is_named_so() {
         let bag = bag(folder.path(), &vec![bad; n], false);
         let found = read(&Bag::open(&bag).unwrap(), Which::Last);
         let topics = (found.topics, &found.reading);
-        let lines = looked_for(&found.measured, topics, AxisSet::EMPTY.with(Axis::X));
+        let none = PerAxis::default();
+        let axes = (AxisSet::EMPTY.with(Axis::X), &none);
+        let lines = looked_for(&found.measured, topics, axes);
         let words = format!("each of its {n} messages was left out");
         assert!(lines[0].contains(&words), "{lines:?}");
         assert!(!lines[0].contains("it is about"), "{lines:?}");
