@@ -139,7 +139,10 @@ pub struct CircularRecording {
 
 impl CircularRecording {
     /// Refuses what cannot be evaluated; `recording` is its place in the caller's list.
-    pub(super) fn check(&self, recording: usize) -> Result<(), BreakdownError> {
+    ///
+    /// # Errors
+    /// With the field or the sample, its value and limit.
+    pub fn check(&self, recording: usize) -> Result<(), BreakdownError> {
         let n = self.samples.len();
         if n < MIN_SAMPLES_OF_CIRCLE {
             let least = MIN_SAMPLES_OF_CIRCLE;

@@ -33,7 +33,12 @@ pub(super) fn outlier(circle: &CircleRecording) -> Option<String> {
 
 /// Why a run does not count among the causes; `None`: it does.
 pub(super) fn of_causes(circle: &CircleRecording, recording: &CircularRecording) -> Option<String> {
-    outlier(circle).or_else(|| recording.beyond().map(|sample| in_words(circle, sample)))
+    let beyond = || recording.beyond().map(|sample| in_words(circle, sample));
+    let unusable = || {
+        let error = recording.check(circle.segment.run as usize).err()?;
+        Some(error.to_string().replacen("recording", "run", 1))
+    };
+    outlier(circle).or_else(beyond).or_else(unusable)
 }
 
 fn in_words(circle: &CircleRecording, place: usize) -> String {

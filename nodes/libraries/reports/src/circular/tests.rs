@@ -346,6 +346,42 @@ fn an_outlier_refuses_its_run_by_name_in_figures_and_causes_and_the_others_are_e
 }
 
 #[test]
+fn a_circle_that_cannot_be_broken_down_leaves_the_causes_of_the_others() {
+    type Change = fn(&mut CircleRecording);
+    let ways: [(Change, &str); 3] = [
+        (
+            |it| it.segment.feed_mm_s = -1000.0,
+            "run 2: feed_mm_s = -1000",
+        ),
+        (|it| it.points.clear(), "run 2: 0 samples"),
+        (
+            |it| it.segment.sense = Sense::CounterClockwise,
+            "run 2: angles sweep",
+        ),
+    ];
+    for (change, words) in ways {
+        let mut circles = [
+            circle(1, Sense::CounterClockwise, Instrument::Ballbar),
+            circle(2, Sense::Clockwise, Instrument::Ballbar),
+        ];
+        change(&mut circles[1]);
+        let found = sections(&circles, None, &TestConditions::default()).unwrap();
+        let causes = found.last().unwrap();
+        assert!(
+            causes.answers[0].contains("in 1 recordings"),
+            "{:?}",
+            causes.answers
+        );
+        let words = format!("Left out: {words}");
+        assert!(
+            all_words(causes).contains(&words),
+            "{words}: {}",
+            all_words(causes)
+        );
+    }
+}
+
+#[test]
 fn where_no_circle_is_sound_nothing_is_evaluated_and_each_reason_is_named() {
     let slips: Vec<(u32, usize, f64)> = (1..=4).map(|run| (run, 7, 9.0)).collect();
     let found = moved(&slips);
