@@ -169,6 +169,7 @@ mod tests {
             up_mm: vec![vec![0.001, 0.002, 0.003], vec![0.003, 0.004, 0.005]],
             down_mm: vec![vec![-0.001, -0.002, -0.003], vec![-0.003, -0.002, -0.001]],
             mean_mm: 0.0,
+            outlying: Default::default(),
             left_out: vec![],
             compensated,
             longest_rest: None,

@@ -524,11 +524,8 @@ fn units_that_cannot_be_right_are_asked_about() {
 
 #[test]
 fn a_map_for_a_bag_is_refused_and_a_folder_is_a_bag() {
-    assert!(
-        from_table::of(Path::new("runs/a.bag"), None)
-            .unwrap()
-            .is_none()
-    );
+    let folder = from_table::of(Path::new("runs/a.bag"), None).unwrap();
+    assert!(folder.is_none());
     let Err(refused) = from_table::of(Path::new("bag"), Some(Path::new("map.yaml"))) else {
         panic!("taken");
     };
@@ -547,6 +544,7 @@ fn a_rotary_axis_without_a_reference_says_why_it_has_no_figures() {
         up_rad: vec![],
         down_rad: vec![],
         mean_rad: 0.0,
+        outlying: Default::default(),
         left_out: vec![],
         longest_rest: Some(metrology::stamp::Span::from_nanos(2_000_000_000)),
         has_readings: false,

@@ -56,6 +56,7 @@ fn section(test: &RotaryTest, budget: Option<&Budget>) -> Result<Section> {
         }
     }
     section.tell_left_out(&test.left_out);
+    section.name_far(&test.outlying.far);
     Ok(section)
 }
 

@@ -274,6 +274,7 @@ mod tests {
                 targets_mm: targets_mm.clone(),
                 up_mm: vec![run.clone(); 5],
                 mean_mm: 0.0,
+                outlying: Default::default(),
                 down_mm: vec![run.clone(); 5],
                 left_out: vec![],
                 compensated: false,

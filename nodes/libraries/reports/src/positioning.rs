@@ -132,6 +132,7 @@ fn section(tests: &Tests, test: &LinearTest, measured: &Measured) -> Result<Sect
         }
     }
     section.tell_left_out(&test.left_out);
+    section.name_far(&test.outlying.far);
     Ok(section)
 }
 

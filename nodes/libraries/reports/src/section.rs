@@ -116,6 +116,13 @@ impl Section {
         }
     }
 
+    /// A line for every reading that is far from the others and counts.
+    pub fn name_far(&mut self, far: &[String]) {
+        for line in far {
+            self.warn("Far from the others", format!("{}.", capitalised(line)));
+        }
+    }
+
     /// For a terminal.
     #[must_use]
     pub fn terminal(&self) -> String {

@@ -418,6 +418,7 @@ mod tests {
                 up_rad: vec![],
                 down_rad: vec![],
                 mean_rad: 0.0,
+                outlying: Default::default(),
                 left_out: vec![],
                 longest_rest: Some(Span::from_nanos(2_000_000_000)),
                 has_readings: true,

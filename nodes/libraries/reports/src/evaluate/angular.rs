@@ -9,6 +9,7 @@ use metrology::Axis;
 use metrology::sample::{AngleSample, AxisState, TestKind, TestSegment};
 use metrology::stamp::{Host, Span, Stamp};
 
+use super::linear::slips::Outlying;
 use super::linear::targets::{Places, left_out, targets};
 use super::linear::{STOP_SETTLE, Visits, axis_of, level};
 
@@ -30,7 +31,9 @@ pub struct RotaryTest {
     pub down_rad: Vec<Vec<f64>>,
     /// That mean: what the zero of the reference and the zero of the axis differ by, without whole turns, rad.
     pub mean_rad: f64,
-    /// Places with readings that are no targets, and why.
+    /// Readings far from the others of their targets.
+    pub outlying: Outlying,
+    /// Places with readings that are no targets, and runs that do not count; each with the reason.
     pub left_out: Vec<String>,
     /// Longest rest of the command; none: nothing rested.
     pub longest_rest: Option<Span>,
@@ -154,8 +157,8 @@ fn test(group: &[Run]) -> Option<RotaryTest> {
         .map(|run| visits(run, zero_rad.unwrap_or(0.0), &places))
         .collect();
     let (targets, sides) = targets(&runs);
-    let numbers: Vec<u32> = group.iter().map(|run| run.begin.run).collect();
-    let left_out = left_out(&runs, &numbers, (&targets, sides), (&places, "deg"));
+    let mut numbers: Vec<u32> = group.iter().map(|run| run.begin.run).collect();
+    let mut left_out = left_out(&runs, &numbers, (&targets, sides), (&places, "deg"));
     let of = |side: usize| {
         if !sides.contains(&side) {
             return vec![];
@@ -164,15 +167,20 @@ fn test(group: &[Run]) -> Option<RotaryTest> {
         runs.iter().map(row).collect::<Vec<Vec<f64>>>()
     };
     let (mut up_rad, mut down_rad) = (of(0), of(1));
-    let mean_rad = zero_rad.unwrap_or(0.0) + level(&mut up_rad, &mut down_rad);
     let targets_deg = places.at(&targets).into_iter();
+    let targets_rad: Vec<f64> = targets_deg.map(f64::to_radians).collect();
+    let sides = [&mut up_rad, &mut down_rad];
+    let outlying = Outlying::of(false, &targets_rad, &mut numbers, sides);
+    left_out.extend(outlying.left_out());
+    let mean_rad = zero_rad.unwrap_or(0.0) + level(&mut up_rad, &mut down_rad);
     Some(RotaryTest {
         axis: first.axis,
         first_run: first.begin.run,
-        targets_rad: targets_deg.map(f64::to_radians).collect(),
+        targets_rad,
         up_rad,
         down_rad,
         mean_rad: within_half_a_turn_rad(mean_rad),
+        outlying,
         left_out,
         longest_rest: read().map(|stop| stop.until - stop.since).max(),
         has_readings: zero_rad.is_some(),

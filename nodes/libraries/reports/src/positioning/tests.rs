@@ -19,6 +19,7 @@ pub(super) fn test(direction: [f64; 3]) -> LinearTest {
         targets_mm: vec![0.0, 100.0, 300.0],
         up_mm: vec![vec![0.0, 0.001, 0.003]],
         mean_mm: 0.0,
+        outlying: Default::default(),
         down_mm: vec![vec![0.002, 0.003, 0.005]],
         left_out: vec![],
         compensated: false,
