@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use abbe_msgs::topics::{self, Origin};
 use recorder::{Bag, Event, Order};
 
 use crate::contract::{changed, check, check_with, short_run};
@@ -17,6 +18,28 @@ fn messages(bag: &Path) -> u64 {
         count += u64::from(matches!(event, Event::Message(_)));
     }
     count
+}
+
+/// Messages up to the last one that came from outside.
+fn up_to_the_last_input(bag: &Path) -> u64 {
+    let bag = Bag::open(bag).unwrap();
+    let is_raw = |topic: &str| {
+        let is_of =
+            |name: &str| topic.ends_with(name) || (name.ends_with('/') && topic.contains(name));
+        let known = topics::all().iter().find(|it| is_of(it.name));
+        known.is_some_and(|it| it.origin == Origin::Raw)
+    };
+    let mut messages = bag.messages(Order::File);
+    let (mut count, mut last) = (0, 0);
+    while let Some(event) = messages.next_event() {
+        if let Event::Message(message) = event {
+            count += 1;
+            if is_raw(&bag.topic(message.topic).topic) {
+                last = count;
+            }
+        }
+    }
+    last
 }
 
 /// Holds a bag that fresh nodes take over after these numbers of messages against the whole replay.

@@ -229,6 +229,29 @@ mod tests {
     }
 
     #[test]
+    fn a_file_that_would_be_a_part_of_a_bag_is_refused() {
+        let home = tempfile::tempdir().unwrap();
+        let [bag, other] = ["bag", "other"].map(|name| home.path().join(name));
+        for folder in [&bag, &other] {
+            std::fs::create_dir(folder).unwrap();
+        }
+        std::fs::write(other.join("metadata.yaml"), "").unwrap();
+        let said = |path: PathBuf| {
+            let output = Output::new("--json", path, Form::Json);
+            refusal(&[output], &[&bag])
+        };
+        for folder in [&bag, &other] {
+            let refused = said(folder.join("x.mcap")).unwrap();
+            assert!(
+                refused.contains("is read with every *.mcap in it"),
+                "{refused}"
+            );
+            assert_eq!(said(folder.join("x.json")), None);
+        }
+        assert_eq!(said(home.path().join("x.mcap")), None);
+    }
+
+    #[test]
     fn a_dash_is_no_file() {
         for (option, form) in [
             ("--html", Form::Html),
