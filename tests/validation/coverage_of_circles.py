@@ -10,7 +10,7 @@ Printed with numpy 2.4.6 for 4000 machines, in % (two standard deviations are 0.
 
     circle     G 95.7  F max 96.9  F min 96.0  G(b) 93.9  D 97.0  H 95.9  G ccw 95.5  F max ccw 96.5
       with all of the certificate  G 95.0  F max 98.0  F min 97.4  G(b) 93.0  D 98.1  H 93.2  G ccw 94.8  F max ccw 98.0
-    diagonals  E_d 97.5  B_d 97.4  spread 95.7
+    diagonals  E_d 97.5  B_d 97.4  spread 95.7  lengths 96.6
     thermal    d 94.8  range 93.1  rate 98.8, with the period of the instrument's error  rate 95.3
                with that and an artefact that grows  d 98.6  range 95.1  rate 99.7
 """
@@ -177,11 +177,13 @@ def diagonals(rng: np.random.Generator) -> Held:
 
 
 def of_diagonals(truth: np.ndarray, read: np.ndarray, far: np.ndarray, known: tuple, bodies: tuple) -> Held:
-    """E_d, B_d and the spread of means by diagonal, side and target; `known`: both parts, beam, drift and unrest."""
+    """E_d, B_d, the spread of means by diagonal, side and target, and the range of lengths; `known`: both parts, beam, drift and unrest."""
     constant, by_length, aside, u_drift, unrest = known
 
-    def figures_of(means: np.ndarray) -> tuple[float, float, float]:
-        return np.ptp(means, axis=(1, 2)).max(), abs(means[:, 0] - means[:, 1]).max(), float(np.ptp(means))
+    def figures_of(means: np.ndarray) -> tuple[float, float, float, float]:
+        lengths = means.mean(axis=1)[:, -1] - means.mean(axis=1)[:, 0]
+        of_each = np.ptp(means, axis=(1, 2)).max(), abs(means[:, 0] - means[:, 1]).max()
+        return *of_each, float(np.ptp(means)), float(np.ptp(lengths))
 
     def heat(apart: float) -> float:
         return sum((b["alpha"] * apart * b["half_width"]) ** 2 + (b["warm"] * apart * b["half_alpha"]) ** 2 for b in bodies)
@@ -199,8 +201,10 @@ def of_diagonals(truth: np.ndarray, read: np.ndarray, far: np.ndarray, known: tu
     of_one += (heat(ends[0] - ends[1]) + (beam * (ends[0] - ends[1])) ** 2) / 3
     one_line = read.argmax() // read[0].size == read.argmin() // read[0].size
     of_spread = of_one if one_line else of_split
-    variances = of_e, of_reversal(u_drift, unrest), of_spread
-    every = zip(("E_d", "B_d", "spread"), figures_of(read), figures_of(truth), variances)
+    of_lengths = (2 * constant**2 + 4 * constant * by_length * far[-1]) / 4
+    of_lengths += 2 * (beam * far[-1]) ** 2 / 3 + drift
+    variances = of_e, of_reversal(u_drift, unrest), of_spread, of_lengths
+    every = zip(("E_d", "B_d", "spread", "lengths"), figures_of(read), figures_of(truth), variances)
     return {name: abs(found - right) <= 2 * np.sqrt(variance) for name, found, right, variance in every}
 
 
