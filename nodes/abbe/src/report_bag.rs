@@ -269,19 +269,8 @@ fn judged_page(
     let defaults = machine_defaults::of_tests(tests);
     let defaults_line = machine_defaults::in_words(&defaults);
     let mut sections = sections(tests, budget)?;
-    let mut lines = loss::in_words(&tests.reading);
-    lines.extend(tests.broken_off.iter().map(ToString::to_string));
-    let n = tests.not_evaluated.len();
-    if n > 0 {
-        lines.push(format!(
-            "NOT WHOLE: runs that were measured and are not evaluated: {n}."
-        ));
-    }
-    lines.extend(tests.not_evaluated.iter().map(ToString::to_string));
-    let is_bad = n > 0 || !tests.reading.is_whole();
-    if sections.is_empty() {
-        lines.push("The bag holds no test that can be evaluated.".to_owned());
-    }
+    let lines = lines_of(tests, sections.is_empty());
+    let is_bad = !tests.not_evaluated.is_empty() || !tests.reading.is_whole();
     let all = sections.iter().map(|section| section.figures.clone());
     let mut figures: Vec<serde_json::Value> = all.filter(|figures| !figures.is_null()).collect();
     if budget.is_none() {
@@ -334,6 +323,23 @@ fn judged_page(
         }),
         lines: lines.into_iter().chain(defaults_line).collect(),
     })
+}
+
+/// What was lost, broken off or not evaluated, in words.
+fn lines_of(tests: &Tests, is_empty: bool) -> Vec<String> {
+    let mut lines = loss::in_words(&tests.reading);
+    lines.extend(tests.broken_off.iter().map(ToString::to_string));
+    let n = tests.not_evaluated.len();
+    if n > 0 {
+        lines.push(format!(
+            "NOT WHOLE: runs that were measured and are not evaluated: {n}."
+        ));
+    }
+    lines.extend(tests.not_evaluated.iter().map(ToString::to_string));
+    if is_empty {
+        lines.push("The bag holds no test that can be evaluated.".to_owned());
+    }
+    lines
 }
 
 /// The decisions on figures that were measured under these conditions.

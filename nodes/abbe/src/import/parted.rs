@@ -222,7 +222,12 @@ fn noted(name: &str, cells: &[Cell<'_>]) -> Result<()> {
         MARKING.contains(&text.to_lowercase().as_str())
             || (!text.is_empty() && text.chars().all(is_sign))
     };
-    let odd = cells.iter().find(|cell| is_marking(cell.text));
+    // A letter beside other letters is the name of an axis.
+    let is_letter = |text: &str| text.len() == 1 && text.chars().all(char::is_alphabetic);
+    let has_other_letters =
+        { cells.iter() }.any(|cell| is_letter(cell.text) && !is_marking(cell.text));
+    let counts = |text: &str| is_marking(text) && !(has_other_letters && is_letter(text));
+    let odd = cells.iter().find(|cell| counts(cell.text));
     match odd.filter(|_| !cells.iter().all(|cell| is_marking(cell.text))) {
         Some(odd) => bail!("{}", refusal(odd, name, "other text in other rows")),
         None => Ok(()),

@@ -230,7 +230,8 @@ mod tests {
     fn a_direction_with_a_run_a_number_an_error_and_a_unit_is_a_pass() {
         let arrow = |way: &str| if way == "up" { '↑' } else { '↓' };
         let sign = |way: &str| if way == "up" { '+' } else { '-' };
-        let layouts: [&dyn Fn(u32, &str) -> String; 14] = [
+        type Layout<'f> = &'f dyn Fn(u32, &str) -> String;
+        let layouts: [Layout<'_>; 14] = [
             &|k, way| format!("{way} {k} [um]"),
             &|k, way| format!("{k} {way}"),
             &|k, way| format!("{k}{}", arrow(way)),

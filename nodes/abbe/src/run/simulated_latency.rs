@@ -85,13 +85,13 @@ fn settings<'i>(ini: &'i str, key: &'static str) -> impl Iterator<Item = &'i str
 
 fn delay(ini: &str, hal: &str) -> Option<Delay> {
     let period_ns: f64 = settings(ini, "SERVO_PERIOD").next()?.parse().ok()?;
-    let set = hal.lines().filter_map(|line| {
+    let mut set = hal.lines().filter_map(|line| {
         let mut words = line.split_whitespace();
         let is_delay = words.next() == Some("setp") && words.next() == Some(DELAY_PIN);
         is_delay.then(|| words.next()).flatten()
     });
     // The last setting of a pin is the one that holds.
-    let on_delay_s: f64 = set.last()?.parse().ok()?;
+    let on_delay_s: f64 = set.next_back()?.parse().ok()?;
     let delay = Delay {
         on_delay_s,
         servo_period_s: period_ns * 1e-9,

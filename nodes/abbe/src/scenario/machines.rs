@@ -55,7 +55,9 @@ pub fn check(folder: &Path, nodes: &[LaunchNode]) -> Result<()> {
 fn check_single<'n>(nodes: impl Iterator<Item = &'n LaunchNode>) -> Result<()> {
     let mut first = BTreeMap::<&str, &str>::new();
     for node in nodes.filter(|node| !PLURAL.contains(&node.exec.as_str())) {
-        if let Some(other) = first.insert(&node.exec, &node.name) {
+        let other = first.insert(&node.exec, &node.name);
+        // Launch files of one cell name the same node; a name that is there twice is refused by who composes it.
+        if let Some(other) = other.filter(|other| *other != node.name) {
             bail!(
                 "nodes {other} and {} are both a {} of one namespace, and would publish the same topics: take one out, or give it a \
                  namespace of its own",

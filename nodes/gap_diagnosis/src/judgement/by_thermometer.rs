@@ -52,9 +52,16 @@ pub(crate) fn shifts(scope: &Scope<'_, '_>, thermometers: &[Note]) -> Vec<Instan
         let own = sensors.iter().find(|sensor| sensor.id == id);
         own.is_some_and(|own| DRIVEN[0].1.contains(&own.place))
     };
+    let bends = bends_by(stack);
+    let bends = bends.as_deref();
     let ids = found.flat_map(|(channel, found)| {
         let kept = found.by.iter().map(|one| one.thermometer.clone());
-        kept.filter(move |id| !(reads_z(channel) && is_spindle(id)))
+        // Along X the column's bend is in its wider form alone.
+        let has_own = move |id: &str| match reads_z(channel) {
+            true => is_spindle(id) || bends == Some(id),
+            false => channel.ends_with('Y') && bends == Some(id),
+        };
+        kept.filter(move |id| !has_own(id))
     });
     let ids: BTreeSet<String> = ids.collect();
     let targets = ids.into_iter().map(Target::Thermometer);
@@ -65,6 +72,22 @@ pub(crate) fn shifts(scope: &Scope<'_, '_>, thermometers: &[Note]) -> Vec<Instan
             begins: None,
         })
         .collect()
+}
+
+/// The thermometer that alone drives the bend of the column, where it is no pair.
+fn bends_by(stack: &Stack<'_>) -> Option<String> {
+    let read = &stack.session.history.temperature_degc;
+    let at = |place: SensorPlace| {
+        let sensors = stack.twin.machine().temperature_sensors.iter();
+        let mut there = sensors.filter(|own| own.place == place && read.contains_key(&own.id));
+        there.next().map(|own| own.id.clone())
+    };
+    let [column, ambient, bed] =
+        [SensorPlace::Column, SensorPlace::Ambient, SensorPlace::Bed].map(at);
+    match (column, ambient) {
+        (Some(_), Some(_)) => None,
+        (column, ambient) => column.or(ambient).or(bed),
+    }
 }
 
 /// Adds the check to the members of a session of logs that go with thermometers. Of logs that nothing repeats an event is not named

@@ -42,8 +42,9 @@ impl Diagnosed {
     /// When a number has no place in JSON.
     pub fn json(&self) -> Result<serde_json::Value> {
         let is_whole = self.losses().is_empty();
-        let of_runs = (!self.omitted.is_empty())
-            .then(|| serde_json::json!({ "omitted_of_runs": self.omitted }));
+        let of_runs = (!self.omitted.is_empty()).then(
+            || serde_json::json!({ "places": [], "left_out": [], "omitted_of_runs": self.omitted }),
+        );
         let is_limited = !(self.without.is_empty() && self.ablated.is_empty());
         let simulated = self.simulated.as_ref().map(serde_json::to_value);
         let report = GapReport {
