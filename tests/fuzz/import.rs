@@ -3,6 +3,7 @@
     test,
     expect(
         dead_code,
+        unused_imports,
         reason = "the unit tests of these files run with their own program"
     )
 )]

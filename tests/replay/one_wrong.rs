@@ -24,7 +24,8 @@ fn one_reading_of_another_zero_or_plane_costs_no_circle() {
     let bag = root().join("bags/grid_circles");
     let whole = report(&bag);
     assert_eq!(whole.code, 0, "{}", whole.said);
-    let ways: [(fn(&mut GridSample), &str); 2] = [
+    type Way = fn(&mut GridSample);
+    let ways: [(Way, &str); 2] = [
         (|it| it.zero_id += 1, "other_zero"),
         (|it| it.plane = GridSample::PLANE_ZX, "other_plane"),
     ];
@@ -53,7 +54,8 @@ fn one_reading_of_another_zero_or_plane_costs_no_circle() {
 fn one_state_of_another_machine_or_place_costs_no_target() {
     let home = imported();
     let whole = report(&home.path().join("bag"));
-    let ways: [(fn(&mut AxisState), &str); 2] = [
+    type Way = fn(&mut AxisState);
+    let ways: [(Way, &str); 2] = [
         (
             |it| it.axis = ["Y", "Z", "A"].map(str::to_owned).to_vec(),
             "other_machine",

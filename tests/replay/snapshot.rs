@@ -91,7 +91,7 @@ fn replay_needs_what_was_before_the_middle() {
         "nodes that had forgotten all said the same: {outcome:#}"
     );
     // Behind the last message, and behind the last input.
-    for after in [100_000_000, messages(short_run()) - 1] {
+    for after in [100_000_000, up_to_the_last_input(short_run())] {
         let beyond = ["--resume-after".to_owned(), after.to_string()];
         assert_eq!(check_with(short_run(), &beyond).0, 1, "{after}");
     }

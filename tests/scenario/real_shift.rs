@@ -135,7 +135,12 @@ fn imported(log: &str, map: &str) -> (Option<i32>, String, usize) {
 fn a_log_that_lacks_the_shift_or_a_part_of_it_is_no_standing_machine() {
     let map = read(&root().join(DATA).join("mazak01_map.yaml"));
     let whole = "2016-11-29T11:00:00Z|Srpm|600\n2016-11-29T13:00:00Z|Srpm|1200\n2016-11-29T16:00:00Z|Srpm|0\n";
-    assert_eq!(imported(whole, &map), (Some(0), String::new(), 16));
+    let (code, said, programs) = imported(whole, &map);
+    assert_eq!((code, programs), (Some(0), 16), "{said}");
+    assert!(
+        said.contains("warning: no line from 2016-11-29T11:15:00Z to 2016-11-29T13:00:00Z"),
+        "{said}"
+    );
     let none = [
         (String::new(), "no line with a value has a date"),
         ("hello\n".to_owned(), "1 lines without a bar"),

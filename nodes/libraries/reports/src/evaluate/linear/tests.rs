@@ -204,7 +204,7 @@ fn stops_a_few_nanometres_apart_are_one_target() {
             .runs
             .segment(&segment(run, repeat, true, TestKind::Positioning, &["X"]));
         for x_mm in [&there[..], &[35.0], &back[..]].concat() {
-            let rest = if x_mm == 35.0 { 2 } else { 60 };
+            let rest = if f64::abs(x_mm - 35.0) < 1e-9 { 2 } else { 60 };
             machine.go(Vector3::new(x_mm, 0.0, 0.0), rest, |_, _| 0.0);
         }
         machine.go(Vector3::new(5.0, 0.0, 0.0), 2, |_, _| 0.0);

@@ -68,11 +68,12 @@ fn tested(seed: u64, off: fn(&mut Pcg64Mcg) -> f64) -> Vec<Held> {
     let found = evaluate(&read, &laser.budget()).unwrap();
     let all: Vec<f64> = truths.iter().flat_map(|t| t.3.clone()).collect();
     let lengths_mm: Vec<f64> = truths.iter().map(|t| t.2).collect();
-    let most =
-        |of: fn(&(f64, f64, f64, Vec<f64>)) -> f64| truths.iter().map(of).fold(f64::MIN, f64::max);
+    let most = |all: Vec<f64>| all.into_iter().fold(f64::MIN, f64::max);
+    let errors_mm = most(truths.iter().map(|t| t.0).collect());
+    let reversals_mm = most(truths.iter().map(|t| t.1).collect());
     [
-        ("E_d", found.systematic_error, most(|t| t.0)),
-        ("B_d", found.reversal, most(|t| t.1)),
+        ("E_d", found.systematic_error, errors_mm),
+        ("B_d", found.reversal, reversals_mm),
         ("spread", found.spread, range(&all)),
         ("lengths", found.lengths, range(&lengths_mm)),
     ]
