@@ -261,10 +261,10 @@ impl ImportShift {
                 "{log}: warning: no line from {spans}: what was logged last holds there, and axes rest"
             );
         }
-        if !shift.without_spindle.is_empty() && !shift.is_whole {
+        if !shift.without_spindle.is_empty() {
             let spans = named(&shift.without_spindle);
             complain!(
-                "{log}: no speed of the spindle from {spans}: it stands there in the programs"
+                "{log}: warning: no speed of the spindle from {spans}: it stands there in the programs"
             );
         }
     }

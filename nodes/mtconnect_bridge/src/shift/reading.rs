@@ -243,7 +243,7 @@ pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, 
         });
     }
     reader.cutter.take(order.to, Event::Spindle(None));
-    let without_spindle = reader.cutter.turned.missing(order.from, order.to);
+    let mut without_spindle = reader.cutter.turned.missing(order.from, order.to);
     if without_spindle == [(order.from, order.to)] {
         return Err(BridgeError::SilentSpindle {
             name: order.spindle.clone(),
@@ -251,7 +251,8 @@ pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, 
             to: words(order.to),
         });
     }
-    let is_turning_known = length_s(&without_spindle) < order.bin_s;
+    // What is shorter than one line of a program cannot be seen in it.
+    without_spindle.retain(|span| length_s(&[*span]) >= order.bin_s);
     let covered_s = length_s(&covered);
     // What is shorter than one line of a program cannot be seen in it.
     let is_covered = (order.to - order.from).as_secs_f64() - covered_s < order.bin_s;
@@ -260,7 +261,7 @@ pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, 
     Ok(Shift {
         doubtful: reader.cutter.speeds.doubtful(bin),
         bins: reader.cutter.bins,
-        is_whole: is_covered && is_turning_known && leaps.is_empty() && account.is_whole(),
+        is_whole: is_covered && leaps.is_empty() && account.is_whole(),
         without_spindle,
         silent: reader.silent,
         account,
