@@ -34,6 +34,29 @@ fn a_shops_tables_are_sealed_imported_and_answered_no_worse_than_before() {
     }
 }
 
+/// Shifts whose drawing never changes.
+const SHIFTS: [&str; 7] = ["--arm", "s4", "--n", "3", "--seed", "21", "--in-process"];
+
+#[test]
+fn shifts_are_answered_and_their_changes_counted_no_worse_than_before() {
+    let folder = folder();
+    let (table, said) = run(folder.path(), &SHIFTS);
+    let arms = table["arms"].as_array().unwrap();
+    let [shift] = &arms[..] else {
+        panic!("{said}");
+    };
+    assert_eq!(count(shift, "answered"), [3, 3], "{said}");
+    let [wrong, _] = count(shift, "a wrong name");
+    assert!(wrong <= MAX_WRONG_SHIFTS, "{said}");
+    let [named, _] = count(shift, "nothing hidden: a cause named");
+    assert_eq!(named, 0, "{said}");
+    let [in_time, n] = count(shift, "diagnosed within 5 s (median: half of them)");
+    assert!(in_time <= n && n == 3, "{said}");
+}
+
+/// Most shifts of three with a wrong name.
+const MAX_WRONG_SHIFTS: u64 = 1;
+
 /// Most sessions of five with a wrong name.
 const MAX_WRONG: u64 = 2;
 

@@ -81,7 +81,7 @@ struct Trials {
     /// Arms, by number: i catalogue, ii a class left out, iii different physics, iv null, v null with worse noise,
     /// vi confusable pairs, vii the same with one more run of the diagnosis' choice; alone: each class in turn, large enough to be named;
     /// limit: each class in turn, about as small as can be named; own, own-left-out: classes with programmes of their own;
-    /// s1 a shop's ISO 230-2 run, s2 its ballbar, s3 its logs: with a table of their own.
+    /// s1 a shop's ISO 230-2 run, s2 its ballbar, s3 its logs, s4 its shift: with a table of their own.
     #[arg(long, value_delimiter = ',', default_value = "i")]
     arm: Vec<Arm>,
     /// Trials in each arm.
@@ -211,12 +211,16 @@ impl Trials {
             return Ok(false);
         }
         if of_a_shop < arms.len() {
-            bail!("--arm: s1, s2 and s3 have a table of their own; run them without other arms");
+            bail!("--arm: s1 to s4 have a table of their own; run them without other arms");
         }
-        if self.in_process || self.baselines || !self.ablate.is_empty() {
+        if self.in_process && arms.iter().any(|arm| arm.has_tables()) {
             bail!(
-                "--arm s1, s2, s3: sessions of tables are imported and diagnosed as processes with all rules; \
-                 leave out --in-process, --baselines and --ablate"
+                "--arm s1, s2, s3: sessions of tables are imported and diagnosed as processes; leave out --in-process"
+            );
+        }
+        if self.baselines || !self.ablate.is_empty() {
+            bail!(
+                "--arm s1 to s4: sessions of shops are diagnosed with all rules; leave out --baselines and --ablate"
             );
         }
         Ok(true)

@@ -11,13 +11,15 @@ use gap_diagnosis::GapReport;
 use node_runtime::text_file;
 use serde_json::Value;
 use trials::shop::{Answer, ShopEffect, ShopSession, answer};
-use trials::{Truth, Verdict, judge};
+use trials::verdict::Said;
+use trials::{Arm, Truth, Verdict, judge};
 
 use crate::blind;
 use crate::seal::Seal;
 use crate::trial::{How, Which};
 
 mod page;
+mod shift;
 mod ten_lines;
 
 pub use page::Table;
@@ -36,6 +38,9 @@ type Reported = Result<(GapReport, String), String>;
 /// # Errors
 /// When it cannot be made.
 pub fn trial(how: &How, which: &Which<'_>, tell: &dyn Fn(&str)) -> Result<Vec<Verdict>> {
+    if which.arm == Arm::ShopShift {
+        return shift::trial(how, which, tell);
+    }
     let began = Instant::now();
     let Some(session) = ShopSession::draw(which.arm, which.seed, which.index) else {
         bail!("arm {} is none of a shop", which.arm);
@@ -65,13 +70,31 @@ pub fn trial(how: &How, which: &Which<'_>, tell: &dyn Fn(&str)) -> Result<Vec<Ve
     if !how.keep {
         std::fs::remove_dir_all(&folder)?;
     }
-    let (said, shop, refused) = match &reported {
-        Ok((report, page)) => (Some(judge(report)), Some(answer(report, page)), None),
-        Err(reason) => (None, None, Some(reason.clone())),
+    let answered = reported.as_ref().map_err(String::clone);
+    let answered = answered.map(|(report, page)| (judge(report), answer(report, page)));
+    Ok(vec![verdict(
+        seal.open()?,
+        &seal.sha256,
+        answered,
+        [making_s, diagnosis_s],
+    )])
+}
+
+/// The verdict on a session: what was said of it with what its page or its change points add, or why it was refused; times of
+/// making and diagnosing it, s.
+fn verdict(
+    truth: Truth,
+    sha256: &str,
+    answered: Result<(Said, Answer), String>,
+    [making_s, diagnosis_s]: [f64; 2],
+) -> Verdict {
+    let (said, shop, refused) = match answered {
+        Ok((said, answer)) => (Some(said), Some(answer), None),
+        Err(reason) => (None, None, Some(reason)),
     };
-    Ok(vec![Verdict {
-        truth: seal.open()?,
-        truth_sha256: seal.sha256.clone(),
+    Verdict {
+        truth,
+        truth_sha256: sha256.to_owned(),
         commit: abbe::COMMIT.to_owned(),
         said,
         refused,
@@ -83,7 +106,7 @@ pub fn trial(how: &How, which: &Which<'_>, tell: &dyn Fn(&str)) -> Result<Vec<Ve
         later_closed: None,
         second: None,
         shop: shop.filter(|answer| *answer != Answer::default()),
-    }])
+    }
 }
 
 fn write(session: &ShopSession, folder: &Path) -> Result<()> {

@@ -49,6 +49,8 @@ mod laser;
 mod linear_scale;
 mod measuring;
 
+mod work;
+
 mod error;
 mod file;
 mod limits;
@@ -217,15 +219,7 @@ impl Plant {
         }
         self.heat.spin(spindle_rpm, period_s);
         self.body.pass(period_s);
-        self.elapsed = Span::from_nanos(start.nanos() + period.nanos());
-        if self.heat.pass(period) {
-            self.structure.follow(&self.heat.network);
-            let elapsed_s = self.elapsed.as_secs_f64();
-            self.contact.age(elapsed_s);
-            for drive in self.drives.0.iter_mut().flatten() {
-                drive.age(elapsed_s);
-            }
-        }
+        self.age(period);
         if self.contact.travel(linear_mm, rotary_rad) {
             let tool = self
                 .body
@@ -234,6 +228,19 @@ impl Plant {
         }
         self.collect_edges(start, period, &motor_before);
         self.feedback()
+    }
+
+    /// Lets time pass for heat, and for what wears, dries or is knocked.
+    fn age(&mut self, period: Span) {
+        self.elapsed = Span::from_nanos(self.elapsed.nanos() + period.nanos());
+        if self.heat.pass(period) {
+            self.structure.follow(&self.heat.network);
+            let elapsed_s = self.elapsed.as_secs_f64();
+            self.contact.age(elapsed_s);
+            for drive in self.drives.0.iter_mut().flatten() {
+                drive.age(elapsed_s);
+            }
+        }
     }
 
     /// The last period's feedback.
@@ -471,7 +478,9 @@ fn drives(machine: &MachineFile, truth: &PlantFile) -> Result<PerAxis<Option<Dri
         };
         let drive = Drive::new(constants.ok_or(PlantError::AxisMissing { place, axis })??);
         let drive = match truth.linear_drives.get(&axis) {
-            Some(entry) => drive.that_wears(entry.wear(axis)?),
+            Some(entry) => drive
+                .that_wears(entry.wear(axis)?)
+                .that_dries(entry.dryness(axis)?),
             None => drive,
         };
         let product = drive.natural_step_product(period_s);

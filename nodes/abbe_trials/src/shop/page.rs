@@ -110,8 +110,13 @@ fn words(all: &[&str]) -> Vec<String> {
 fn section(tally: &ShopTally) -> Section {
     let mut section = Section::new(format!("Arm {}: {}", tally.arm, tally.arm.title()));
     let [middle, longest] = tally.times_s.map(|time| time.unwrap_or(0.0));
+    let what = if tally.arm.has_tables() {
+        "import and diagnosis"
+    } else {
+        "the diagnosis"
+    };
     section.lines.push(format!(
-        "{} sessions; import and diagnosis took {middle:.1} s in the middle, {longest:.0} s at most.",
+        "{} sessions; {what} took {middle:.1} s in the middle, {longest:.0} s at most.",
         tally.trials
     ));
     section.tables.push(Rows {

@@ -7,29 +7,38 @@ use trials::shop::{ShopTally, Split};
 /// Ten sentences with the figures of the arms; what was not tried says so.
 pub fn ten_lines(arms: &[ShopTally]) -> Vec<String> {
     let of = |arm: Arm| arms.iter().find(|tally| tally.arm == arm);
-    let [laser, ballbar, logs] = [Arm::ShopPositioning, Arm::ShopBallbar, Arm::ShopLogs].map(of);
+    let [laser, ballbar, logs, shift] = [
+        Arm::ShopPositioning,
+        Arm::ShopBallbar,
+        Arm::ShopLogs,
+        Arm::ShopShift,
+    ]
+    .map(of);
     let nothing = "nothing hidden: a cause named";
     let wrong = "a wrong name";
     vec![
         format!(
-            "A name was wrong, or alone where only a set was right, in {} of laser runs, {} of ballbars, {} of logs.",
+            "A name was wrong, or alone where only a set was right, in {} of laser runs, {} of ballbars, {} of logs, {} of \
+             shifts.",
             share(laser, wrong),
             share(ballbar, wrong),
-            share(logs, wrong)
+            share(logs, wrong),
+            share(shift, wrong)
         ),
         format!(
-            "A good machine was given a cause in {} of laser runs, {} of ballbars, {} of logs.",
+            "A good machine was given a cause in {} of laser runs, {} of ballbars, {} of logs, {} of shifts.",
             share(laser, nothing),
             share(ballbar, nothing),
-            share(logs, nothing)
+            share(logs, nothing),
+            share(shift, nothing)
         ),
         format!(
             "Lost motion by a laser run: {}. It is always a set: one feed tells no more.",
             kinds(laser, "lost motion")
         ),
-        format!("Lead error by a laser run: {}.", kinds(laser, "lead error")),
         format!(
-            "Scale by a laser run: {}. A set with the wavelength: no single laser tells them apart.",
+            "Lead error by a laser run: {}. Scale: {}; a set with the wavelength, for no single laser tells them apart.",
+            kinds(laser, "lead error"),
             kinds(laser, "scale")
         ),
         format!(
@@ -63,9 +72,20 @@ pub fn ten_lines(arms: &[ShopTally]) -> Vec<String> {
             by(logs, MEMORY, &["none"]),
             by(logs, MEMORY, &["0.5 and more"])
         ),
+        format!(
+            "By a shift above D 20: a cause is named in {}, or in the set in {}; what changed has its time in {}; 0.95 or \
+             more of the oracle's gap is closed in {}.",
+            share(shift, "D above 20, resolvable: named"),
+            share(shift, "D above 20, not resolvable: in the set"),
+            share(shift, CHANGED),
+            share(shift, CLOSED)
+        ),
     ]
 }
 
+/// Figures of a shift.
+const CHANGED: &str = "D above 20: what changed has its time";
+const CLOSED: &str = "D above 20: closes 0.95 or more of the oracle's gap (median: half of them)";
 /// Title of the split by noise.
 const MEMORY: &str = "noise that neighbouring readings share";
 const NOT_TRIED: &str = "not tried";

@@ -44,6 +44,9 @@ pub(super) struct Drive {
     /// Half the width of the gap from an instant (s since the start) on.
     wear: Vec<(f64, f64)>,
     has_worn: usize,
+    /// Friction of the guides from an instant on, over that with oil.
+    dryness: Vec<(f64, f64)>,
+    has_dried: usize,
     /// Damping over engaged stiffness, s.
     damping_time_s: f64,
     motor_friction: Friction,
@@ -75,6 +78,8 @@ impl Drive {
             constants,
             wear: Vec::new(),
             has_worn: 0,
+            dryness: Vec::new(),
+            has_dried: 0,
             motor_force: 0.0,
             slide_force: 0.0,
             period_s: 0.0,
@@ -94,14 +99,21 @@ impl Drive {
         self
     }
 
-    /// Lets the gap have the width that it has at `elapsed_s`.
+    /// The drive with guides that run dry: instants in s since the start, friction over that with oil.
+    pub(super) fn that_dries(mut self, dryness: Vec<(f64, f64)>) -> Self {
+        self.dryness = dryness;
+        self
+    }
+
+    /// Lets the gap have the width, and the guides the friction, that they have at `elapsed_s`.
     pub(super) fn age(&mut self, elapsed_s: f64) {
-        while let Some((after_s, half_width)) = self.wear.get(self.has_worn) {
-            if *after_s > elapsed_s {
-                break;
-            }
-            self.constants.coupling.half_width = *half_width;
+        while let Some((_, half_width)) = due(&self.wear, self.has_worn, elapsed_s) {
+            self.constants.coupling.half_width = half_width;
             self.has_worn += 1;
+        }
+        while let Some((_, ratio)) = due(&self.dryness, self.has_dried, elapsed_s) {
+            self.slide_friction.run_dry(ratio);
+            self.has_dried += 1;
         }
     }
 
@@ -160,6 +172,12 @@ impl Drive {
             self.slide_force = self.slide_friction.step(slide_move, self.slide_velocity);
         }
     }
+}
+
+/// The entry of a course that is next, where its instant has come.
+fn due(course: &[(f64, f64)], next: usize, elapsed_s: f64) -> Option<(f64, f64)> {
+    let entry = course.get(next).copied();
+    entry.filter(|(after_s, _)| *after_s <= elapsed_s)
 }
 
 #[cfg(test)]
@@ -266,6 +284,27 @@ mod tests {
         assert!((half_width(&drive) - 1.5e-3).abs() < 1e-12);
         drive.age(60.0);
         assert!((half_width(&drive) - 4e-3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn guides_that_run_dry_wind_the_screw_up_by_their_friction() {
+        // At 50 mm/s the Stribeck part is gone: 60 + 30/626 + 25 of 110,000 and 100,000 one way and the other.
+        let lost_mm = |ratio: f64| {
+            let mut drive = Drive::new(constants()).that_dries(vec![(60.0, ratio)]);
+            drive.age(60.0);
+            let triangle = |t: f64| 50.0 * if t < 2.0 { t } else { 4.0 - t };
+            let trace = follow(&mut drive, triangle, 4.0);
+            let lead = |from: usize, to: usize| {
+                trace[from..to].iter().map(|(m, s)| m - s).sum::<f64>() / (to - from) as f64
+            };
+            lead(1500, 1900) - lead(3500, 3900)
+        };
+        let more_mm = lost_mm(3.0) - lost_mm(1.0);
+        let expected_mm = 2.0 * (60.0 + 30.0 / 626.0) * (1.0 / 1.1e5 + 1.0 / 1e5);
+        assert!(
+            (more_mm / expected_mm - 1.0).abs() < 0.03,
+            "{more_mm} {expected_mm}"
+        );
     }
 
     #[test]

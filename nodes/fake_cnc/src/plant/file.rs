@@ -14,8 +14,8 @@ pub use body::{
     SquarenessEntry, StructureEntry, VibrationEntry,
 };
 pub use drives::{
-    FrictionEntry, LeadCycleEntry, LinearDriveEntry, RotaryDriveEntry, RotaryFrictionEntry,
-    WearEntry,
+    FrictionEntry, LeadCycleEntry, LinearDriveEntry, LubricationEntry, RotaryDriveEntry,
+    RotaryFrictionEntry, WearEntry,
 };
 pub use heat::{
     HeatEntry, LinkEntry, Place, PlaceEntry, ScrewEnd, ScrewEntry, ShopAirEntry, SpindleLossEntry,

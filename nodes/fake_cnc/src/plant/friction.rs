@@ -21,8 +21,8 @@
 //! | tau | `memory_s` | s |
 //!
 //! # Holds when
-//! The step is shorter than a quarter period of mass and presliding stiffness. Not modelled: wear,
-//! lubrication state, dependence on temperature.
+//! The step is shorter than a quarter period of mass and presliding stiffness. Not modelled: wear, dependence
+//! on temperature. Of lubrication [`Friction::run_dry`] has the level alone: the contacts stay as stiff.
 //!
 //! # References
 //! \[1\] F. Al-Bender, V. Lampaert, J. Swevers, IEEE Trans. Autom. Control 50(11), 2005, doi:10.1109/TAC.2005.858676 (from memory).
@@ -46,6 +46,8 @@ pub(super) struct FrictionConstants {
 #[derive(Clone, Debug)]
 pub(super) struct Friction {
     constants: FrictionConstants,
+    /// Coulomb and breakaway friction with oil.
+    oiled: [f64; 2],
     stiffness: [f64; ELEMENTS],
     inverse_stribeck_velocity: f64,
     element: [f64; ELEMENTS],
@@ -61,12 +63,19 @@ impl Friction {
         });
         Self {
             constants,
+            oiled: [constants.coulomb, constants.breakaway],
             stiffness,
             inverse_stribeck_velocity: 1.0 / constants.stribeck_velocity,
             element: [0.0; ELEMENTS],
             level: constants.breakaway,
             follow: 0.0,
         }
+    }
+
+    /// The level of (1) becomes that with oil times a ratio.
+    pub(super) fn run_dry(&mut self, ratio: f64) {
+        let [coulomb, breakaway] = self.oiled.map(|level| ratio * level);
+        (self.constants.coulomb, self.constants.breakaway) = (coulomb, breakaway);
     }
 
     /// Forgets all elastic stress.

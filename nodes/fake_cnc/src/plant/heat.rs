@@ -58,6 +58,7 @@ pub(super) struct Heat {
     rotary: PerAxis<Option<RotaryHeat>>,
     thermometers: Vec<Thermometer>,
     standing_w: [f64; Place::COUNT],
+    is_on: bool,
     gathered_j: [f64; Place::COUNT],
     /// Heat that the screws gave to the castings in the last step, W.
     from_screws_w: [f64; Place::COUNT],
@@ -94,6 +95,7 @@ impl Heat {
                 HEAT_STEP_S,
             )?,
             standing_w,
+            is_on: true,
             gathered_j: [0.0; Place::COUNT],
             from_screws_w: [0.0; Place::COUNT],
             spindle: heat.spindle.clone(),
@@ -148,6 +150,11 @@ impl Heat {
         }
     }
 
+    /// Switches the sources that are always on while the machine is.
+    pub(super) const fn switch(&mut self, is_on: bool) {
+        self.is_on = is_on;
+    }
+
     /// Books one servo period of the spindle.
     #[inline]
     #[expect(clippy::float_cmp, reason = "an unchanged speed needs no new power")]
@@ -176,7 +183,11 @@ impl Heat {
     fn step(&mut self) {
         self.elapsed_s += HEAT_STEP_S;
         self.air_degc = self.air.step(self.elapsed_s);
-        let mut heat_w = self.standing_w;
+        let mut heat_w = if self.is_on {
+            self.standing_w
+        } else {
+            [0.0; Place::COUNT]
+        };
         for (place, power_w) in heat_w.iter_mut().enumerate() {
             *power_w += self.gathered_j[place] / HEAT_STEP_S + self.from_screws_w[place];
         }

@@ -32,6 +32,7 @@ const ROWS: &[Row] = &[
     ("backlash_um", 0.0, CENTIMETRE_UM),
     ("backlash_softness_um", 1e-6, 1e3),
     ("after_s", 0.0, LONGEST_S),
+    ("friction_ratio", 0.01, 1e3),
     ("coulomb_n", 1e-6, 1e7),
     ("breakaway_n", 1e-6, 1e7),
     ("stribeck_velocity_mm_s", 1e-6, 1e5),

@@ -40,11 +40,13 @@ pub enum Arm {
     ShopBallbar,
     /// Logs of a shop's displacement sensor and thermometers.
     ShopLogs,
+    /// A shift of four hours with production between its tests.
+    ShopShift,
 }
 
 impl Arm {
     /// Every arm, in order.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Catalogue,
         Self::LeftOut,
         Self::Foreign,
@@ -59,6 +61,7 @@ impl Arm {
         Self::ShopPositioning,
         Self::ShopBallbar,
         Self::ShopLogs,
+        Self::ShopShift,
     ];
 
     /// Its number in the protocol; the others go by their names.
@@ -79,6 +82,7 @@ impl Arm {
             "s1",
             "s2",
             "s3",
+            "s4",
         ][self as usize]
     }
 
@@ -100,6 +104,7 @@ impl Arm {
             "a shop's ISO 230-2 run",
             "a shop's ballbar",
             "a shop's logs of displacement and temperatures",
+            "a shop's shift of four hours",
         ][self as usize]
     }
 
@@ -109,9 +114,15 @@ impl Arm {
         matches!(self, Self::LeftOut | Self::OwnLeftOut)
     }
 
-    /// Whether its sessions are tables as shops have them.
+    /// Whether its sessions are those of shops, which have a table of their own.
     #[must_use]
     pub const fn is_of_a_shop(self) -> bool {
+        self.has_tables() || matches!(self, Self::ShopShift)
+    }
+
+    /// Whether its sessions are tables that the product imports.
+    #[must_use]
+    pub const fn has_tables(self) -> bool {
         matches!(
             self,
             Self::ShopPositioning | Self::ShopBallbar | Self::ShopLogs

@@ -9,7 +9,8 @@
 //! them, `covariate` knows what a leftover should go with, `target` says which figures are as good as they should be;
 //! `compared` has the programmes that a designed one is compared with; `comparison` puts the methods of `baseline` and diagnoses without one of their rules before the same judge.
 //!
-//! `shop` has generator, judge and table of the sessions that shops bring, in files of its own.
+//! `shop` has generator, judge and table of the sessions that shops bring, in files of its own; `shift` draws those of
+//! hours on the plant.
 //!
 //! `size` says how large a hidden effect is for these measurements: D, the root of its chi-square against the
 //! trial's own scatter, of which the generator, unlike the diagnoser, knows the covariance.
@@ -33,6 +34,7 @@ pub mod rig;
 #[cfg(test)]
 mod sample;
 pub mod scatter;
+pub mod shift;
 pub mod shop;
 mod size;
 pub mod tally;
@@ -48,6 +50,7 @@ pub use effect::Class;
 pub use error::TrialError;
 pub use measurement::{Sample, measure};
 pub use rig::Rig;
+pub use shift::ShiftTrial;
 pub use tally::Tally;
 pub use trial::Trial;
 pub use truth::Truth;

@@ -8,7 +8,7 @@ use fake_cnc::{Cnc, Input as ToControl, Outcome, Output as FromControl, Plant};
 use metrology::sample::{
     AxisState, GridSample, LengthSample, PlanState, ProbeTrigger, TemperatureSample, TestSegment,
 };
-use metrology::stamp::{Host, NANOS_PER_S, Span};
+use metrology::stamp::{Host, Machine, NANOS_PER_S, Span};
 use metrology::{PerAxis, Stage, Stamp};
 use nalgebra::Vector3;
 use sequencer::{Config, Input as ToSequencer, Output as FromSequencer, ProgramEnd, Sequencer};
@@ -16,6 +16,7 @@ use sequencer::{Config, Input as ToSequencer, Output as FromSequencer, ProgramEn
 use crate::error::TrialError;
 use crate::rig::Rig;
 use crate::scatter::Scattering;
+use crate::shift::{PlateWay, Spell};
 
 /// Time between two looks of the sequencer, s.
 const LOOK_S: f64 = 0.1;
@@ -48,6 +49,12 @@ struct Session<'a> {
     control: Cnc<Plant>,
     began: Stamp<Host>,
     now: Stamp<Host>,
+    end: Stamp<Host>,
+    /// How much of the time its clock does not know, for it passed in coarse steps.
+    skipped: Span,
+    /// Its clock at the last state.
+    controller: (Stamp<Host>, Stamp<Machine>),
+    plate: PlateWay<'a>,
     scattering: Scattering<'a>,
     commanded: PerAxis<f64>,
     take: &'a mut dyn FnMut(Stamp<Host>, Sample),
@@ -73,10 +80,14 @@ pub fn measure(rig: &Rig, take: &mut dyn FnMut(Stamp<Host>, Sample)) -> Result<(
         control: Cnc::new(
             &rig.config,
             &rig.control,
-            Plant::new(&rig.control, &rig.plant)?,
+            worked(Plant::new(&rig.control, &rig.plant)?, &rig.past),
         )?,
         began: Stamp::from_nanos(rig.start_s * NANOS_PER_S),
         now: Stamp::from_nanos(rig.start_s * NANOS_PER_S),
+        end: Stamp::from_nanos(rig.start_s * NANOS_PER_S) + Span::from_secs_f64(LIMIT_S),
+        skipped: Span::default(),
+        controller: (Stamp::default(), Stamp::default()),
+        plate: PlateWay::new(rig.plate_moves.as_ref()),
         scattering: Scattering::new(&rig.scatter),
         commanded: PerAxis::default(),
         take,
@@ -88,7 +99,6 @@ pub fn measure(rig: &Rig, take: &mut dyn FnMut(Stamp<Host>, Sample)) -> Result<(
     };
     let period = Span::from_secs_f64(rig.machine.control.servo_period_ms / 1e3);
     let look = Span::from_secs_f64(LOOK_S);
-    let end = session.now + Span::from_secs_f64(LIMIT_S);
     let mut next_look = session.now;
     while session.ended.is_none() {
         if session.now >= next_look {
@@ -96,7 +106,7 @@ pub fn measure(rig: &Rig, take: &mut dyn FnMut(Stamp<Host>, Sample)) -> Result<(
             next_look += look;
         }
         session.tell(ToControl::Tick)?;
-        if session.now > end {
+        if session.now > session.end {
             return Err(TrialError::Endless { limit_s: LIMIT_S });
         }
         session.now += period;
@@ -104,16 +114,33 @@ pub fn measure(rig: &Rig, take: &mut dyn FnMut(Stamp<Host>, Sample)) -> Result<(
     session.ended.unwrap_or(Ok(()))
 }
 
+/// A machine behind what it has done before.
+fn worked(mut plant: Plant, past: &[Spell]) -> Plant {
+    let rest = plant.feedback().motor;
+    for spell in past {
+        plant.switch(spell.is_on);
+        for (slides, step) in spell.steps(&rest) {
+            plant.work(&slides, spell.spindle_rpm, step);
+        }
+    }
+    plant
+}
+
 impl Session<'_> {
     fn ask(&mut self, input: ToSequencer) -> Result<(), TrialError> {
+        let rig = self.rig;
         let mut said = std::mem::take(&mut self.said);
         let Ok(()) = self.sequencer.step(self.now, input, &mut said);
         for output in said.drain(..) {
             match output {
-                FromSequencer::SendProgram { id, name, text } => {
-                    let goal = id;
-                    self.told.push(ToControl::RunProgram { goal, text, name });
-                }
+                FromSequencer::SendProgram { id, name, text } => match rig.production.get(&name) {
+                    Some(spells) => self.produce(id, spells)?,
+                    None => self.told.push(ToControl::RunProgram {
+                        goal: id,
+                        text,
+                        name,
+                    }),
+                },
                 FromSequencer::CancelProgram(goal) => {
                     self.told.push(ToControl::CancelProgram { goal });
                 }
@@ -144,6 +171,57 @@ impl Session<'_> {
         Ok(())
     }
 
+    /// Answers for a program that nobody measures, and lets its time pass in coarse steps.
+    fn produce(&mut self, id: u64, spells: &[Spell]) -> Result<(), TrialError> {
+        let accepted = true;
+        self.ask(ToSequencer::ProgramAnswer { id, accepted })?;
+        let rest = self.control.hardware().feedback().motor;
+        for spell in spells {
+            self.control.hardware_mut().switch(spell.is_on);
+            for (slides, step) in spell.steps(&rest) {
+                let plant = self.control.hardware_mut();
+                plant.work(&slides, spell.spindle_rpm, step);
+                self.now += step;
+                self.end += step;
+                self.skipped = Span::from_nanos(self.skipped.nanos() + step.nanos());
+                self.tell_work(slides, step);
+            }
+        }
+        self.control.hardware_mut().settle_at(&rest);
+        let end = Some(ProgramEnd {
+            done: true,
+            message: String::new(),
+        });
+        self.ask(ToSequencer::ProgramEnd { id, end })
+    }
+
+    /// What a recorder gets of work in coarse steps: where the axes are commanded, and the thermometers at their periods.
+    fn tell_work(&mut self, slides: PerAxis<f64>, step: Span) {
+        let rig = self.rig;
+        let (host_at, controller_at) = self.controller;
+        let axes = rig.machine.axis_set();
+        let controller_at = controller_at + (self.now - host_at);
+        let state = AxisState::standing(self.now, controller_at, axes, slides);
+        (self.take)(self.now, Sample::State(state));
+        let since = self.now - self.began;
+        for sensor in &rig.machine.temperature_sensors {
+            let period = Span::from_secs_f64(sensor.period_s);
+            if since.nanos() % period.nanos() >= step.nanos() {
+                continue;
+            }
+            let plant = self.control.hardware_mut();
+            if let Some(temperature_degc) = plant.sensor_reading(&sensor.id) {
+                let sample = TemperatureSample {
+                    at: self.now,
+                    sensor: sensor.id.clone(),
+                    temperature_degc,
+                    variance_k2: 0.0,
+                };
+                (self.take)(self.now, Sample::Temperature(sample));
+            }
+        }
+    }
+
     fn tell(&mut self, input: ToControl) -> Result<(), TrialError> {
         let mut heard = std::mem::take(&mut self.heard);
         self.control.step(self.now, input, &mut heard)?;
@@ -158,6 +236,8 @@ impl Session<'_> {
         match output {
             FromControl::State(mut state) => {
                 self.commanded = state.commanded;
+                state.controller_at += self.skipped;
+                self.controller = (state.received_at, state.controller_at);
                 if !self.rig.has_motors {
                     state.motor = state.commanded;
                 }
@@ -207,6 +287,9 @@ impl Session<'_> {
         let [u, v] = plane_axes(sample.plane);
         sample.u_mm += self.scattering.reading_mm(u, &place_mm);
         sample.v_mm += self.scattering.reading_mm(v, &place_mm);
+        let moved_mm = self.plate.moved_mm(self.now - self.began, &sample);
+        sample.u_mm += moved_mm[0];
+        sample.v_mm += moved_mm[1];
         let since_s = (self.now - self.began).as_secs_f64();
         let turns = since_s / LATE_TURN_S;
         let wander = self.rig.grid_late_wander * (std::f64::consts::TAU * turns).sin();
@@ -217,6 +300,7 @@ impl Session<'_> {
 
     /// A touch; the run's deviation moves the surface along the approach.
     fn trigger(&mut self, mut trigger: ProbeTrigger) -> Result<(), TrialError> {
+        trigger.controller_at += self.skipped;
         let place_mm = trigger.latched.xyz();
         let deviation_mm =
             Vector3::from_fn(|axis, _| self.scattering.deviation_mm(axis, &place_mm));

@@ -126,7 +126,7 @@ fn plan(steps: &[String], times: usize) -> Result<Plan, TrialError> {
     Plan::from_yaml(&text).map_err(|source| TrialError::ProgrammeText { source })
 }
 
-fn in_both_files(rig: &mut Rig, change: impl Fn(&mut MachineFile)) {
+pub(crate) fn in_both_files(rig: &mut Rig, change: impl Fn(&mut MachineFile)) {
     change(&mut rig.machine);
     change(&mut rig.control);
 }
@@ -235,6 +235,14 @@ fn five_axis(rig: &mut Rig) -> Result<(), TrialError> {
 
 /// Steps that are repeated under thermometers on spindle and column.
 fn watched(rig: &mut Rig, steps: &[&str], times: usize) -> Result<(), TrialError> {
+    add_thermometers(rig);
+    let steps: Vec<String> = steps.iter().map(|step| (*step).to_owned()).collect();
+    rig.plan = plan(&steps, times)?;
+    Ok(())
+}
+
+/// Thermometers on spindle and column.
+pub(crate) fn add_thermometers(rig: &mut Rig) {
     in_both_files(rig, |file| {
         let Some(like) = file.temperature_sensors.first().cloned() else {
             return;
@@ -251,9 +259,6 @@ fn watched(rig: &mut Rig, steps: &[&str], times: usize) -> Result<(), TrialError
             });
         }
     });
-    let steps: Vec<String> = steps.iter().map(|step| (*step).to_owned()).collect();
-    rig.plan = plan(&steps, times)?;
-    Ok(())
 }
 
 impl Hidden {

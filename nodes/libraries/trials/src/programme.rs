@@ -82,7 +82,7 @@ pub(crate) fn plan(
     Plan::from_yaml(&text).map_err(|source| TrialError::ProgrammeText { source })
 }
 
-fn circle(placement: &str, radius_mm: f64, feed_mm_min: f64) -> String {
+pub(crate) fn circle(placement: &str, radius_mm: f64, feed_mm_min: f64) -> String {
     format!(
         "{{do: grid, placement: {placement}, trajectory: circle, radius_mm: {radius_mm:.1}, \
          feed_mm_min: {feed_mm_min:.1}, sense: both, on_the_fly: true}}"

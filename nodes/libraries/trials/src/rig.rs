@@ -24,6 +24,7 @@ use sequencer::Plan;
 use crate::error::TrialError;
 use crate::programme::{Conditions, plan};
 use crate::scatter::{Heavier, Scatter, WAVES};
+use crate::shift::{PlateMove, Spell};
 
 const MACHINE: &str = include_str!("../data/machine.yaml");
 const PLANT: &str = include_str!("../data/plant.yaml");
@@ -59,6 +60,12 @@ pub struct Rig {
     pub plan: Plan,
     /// Programs that the plan runs, by name.
     pub programs: BTreeMap<String, String>,
+    /// Those of them that pass in coarse steps.
+    pub production: BTreeMap<String, Vec<Spell>>,
+    /// What the machine did before the session.
+    pub past: Vec<Spell>,
+    /// How the plate of the grid encoder moves on the table.
+    pub plate_moves: Option<PlateMove>,
     /// What no two runs have in common.
     pub scatter: Scatter,
     /// How much later the grid encoder stamps its readings than it should, s.
@@ -113,6 +120,9 @@ impl Rig {
         Ok(Self {
             plan,
             programs: BTreeMap::new(),
+            production: BTreeMap::new(),
+            past: vec![],
+            plate_moves: None,
             control: machine.clone(),
             config,
             scatter: scatter(random, heavier),

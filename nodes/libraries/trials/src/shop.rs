@@ -10,6 +10,8 @@
 //! | s1 | one ISO 230-2 run of an axis | `positioning`, `lead`, `layout` |
 //! | s2 | circles of a ballbar | `ballbar`, `machine_motion` |
 //! | s3 | logs of displacement and temperatures | `logs`, `heat` |
+//!
+//! Arm s4, a shift, is measured on the plant and has no tables (`shift`); truth, judge and table are those of here.
 
 use rand_pcg::Pcg64Mcg;
 
@@ -17,6 +19,7 @@ use crate::arm::Arm;
 use crate::trial::stream;
 
 mod ballbar;
+mod change;
 pub(crate) mod dice;
 mod heat;
 mod judge;
@@ -30,9 +33,11 @@ mod shape;
 mod tally;
 mod truth;
 
+pub use change::ReportedChange;
 pub use judge::{Answer, answer, follows_in};
 pub use tally::{Line, ShopTally, Split};
-pub use truth::{Follow, Name, ShopEffect, ShopTruth};
+pub(crate) use truth::name;
+pub use truth::{Follow, Name, ShiftTruth, ShopEffect, ShopTruth, TrueChange};
 
 /// One table of a session with its map.
 #[derive(Clone, Debug, PartialEq, Eq)]

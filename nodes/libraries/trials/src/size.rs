@@ -53,6 +53,7 @@ use crate::scatter::Scatter;
 
 use waves::Waves;
 
+mod beside;
 mod waves;
 
 /// Rows that a run's readings are thinned to.

@@ -35,6 +35,9 @@ pub struct LinearDriveEntry {
     /// How the gap widens: what it is from some instants on.
     #[serde(default)]
     pub wear: Vec<WearEntry>,
+    /// How the guides run dry: what their friction is from some instants on.
+    #[serde(default)]
+    pub lubrication: Vec<LubricationEntry>,
     /// Friction of bearings, seals and motor, at the nut.
     pub motor_friction: FrictionEntry,
     /// Friction of the guides.
@@ -68,6 +71,16 @@ pub struct WearEntry {
     pub after_s: f64,
     /// Width of the gap.
     pub backlash_um: f64,
+}
+
+/// Friction of the guides from an instant on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LubricationEntry {
+    /// Since the start.
+    pub after_s: f64,
+    /// Coulomb and breakaway friction over those of `guide_friction`.
+    pub friction_ratio: f64,
 }
 
 /// Friction of a linear contact.
@@ -241,22 +254,40 @@ impl LinearDriveEntry {
 impl LinearDriveEntry {
     /// Instants, s since the start, with half the width that the gap has from then on, mm.
     pub(in crate::plant) fn wear(&self, axis: Axis) -> Result<Vec<(f64, f64)>, PlantError> {
-        let at = |k: usize, key: &str| format!("linear_drives.{axis}.wear[{k}].{key}");
-        let mut before_s = 0.0;
-        let mut all = Vec::new();
-        for (k, entry) in self.wear.iter().enumerate() {
-            require(
-                entry.after_s.is_finite() && entry.after_s >= before_s,
-                at(k, "after_s"),
-                entry.after_s,
-                "finite and not below the one before",
-            )?;
-            require_not_negative(at(k, "backlash_um"), entry.backlash_um)?;
-            before_s = entry.after_s;
-            all.push((entry.after_s, 0.5 * entry.backlash_um / UM_PER_MM));
-        }
-        Ok(all)
+        let place = format!("linear_drives.{axis}.wear");
+        let entries = self.wear.iter();
+        let all = entries.map(|entry| (entry.after_s, entry.backlash_um));
+        let all = course(&place, "backlash_um", all.collect())?;
+        let half_mm = |um: f64| 0.5 * um / UM_PER_MM;
+        Ok(all
+            .into_iter()
+            .map(|(after_s, um)| (after_s, half_mm(um)))
+            .collect())
     }
+
+    /// Instants, s since the start, with the friction of the guides from then on over that with oil.
+    pub(in crate::plant) fn dryness(&self, axis: Axis) -> Result<Vec<(f64, f64)>, PlantError> {
+        let place = format!("linear_drives.{axis}.lubrication");
+        let entries = self.lubrication.iter();
+        let all = entries.map(|entry| (entry.after_s, entry.friction_ratio));
+        course(&place, "friction_ratio", all.collect())
+    }
+}
+
+/// Instants in order with values that are not negative.
+fn course(place: &str, key: &str, entries: Vec<(f64, f64)>) -> Result<Vec<(f64, f64)>, PlantError> {
+    let mut before_s = 0.0;
+    for (k, (after_s, value)) in entries.iter().enumerate() {
+        require(
+            after_s.is_finite() && *after_s >= before_s,
+            format!("{place}[{k}].after_s"),
+            *after_s,
+            "finite and not below the one before",
+        )?;
+        require_not_negative(format!("{place}[{k}].{key}"), *value)?;
+        before_s = *after_s;
+    }
+    Ok(entries)
 }
 
 impl RotaryDriveEntry {

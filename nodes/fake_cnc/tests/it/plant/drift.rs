@@ -2,6 +2,8 @@
 //! linear in the axes' positions could explain.
 
 use fake_cnc::Plant;
+use fake_cnc::plant::Place;
+use metrology::stamp::Span;
 use metrology::{Axis, PerAxis};
 use nalgebra::{DMatrix, DVector, Matrix4, Vector3, Vector4};
 
@@ -36,6 +38,64 @@ fn work(plant: &mut Plant) {
         let demand = servo.demand(plant, &production(f64::from(tick) * PERIOD_S));
         plant.step(&demand, SPINDLE_RPM, PERIOD);
     }
+}
+
+#[test]
+fn val_half_an_hour_of_strokes_in_coarse_steps_warms_as_in_servo_periods() {
+    const MINUTES: u32 = 30;
+    let fine = {
+        let mut plant = Plant::new(&machine(), &truth()).unwrap();
+        plant.settle_at(&production(0.0).position);
+        let mut servo = Servo::default();
+        for tick in 0..MINUTES * 60_000 {
+            let demand = servo.demand(&plant, &production(f64::from(tick) * PERIOD_S));
+            plant.step(&demand, SPINDLE_RPM, PERIOD);
+        }
+        plant
+    };
+    let coarse = {
+        let mut plant = Plant::new(&machine(), &truth()).unwrap();
+        plant.settle_at(&production(0.0).position);
+        for step in 1..=MINUTES * 240 {
+            let slides = production(f64::from(step) * 0.25).position;
+            plant.work(&slides, SPINDLE_RPM, Span::from_nanos(250_000_000));
+        }
+        plant
+    };
+    assert_eq!(fine.elapsed(), coarse.elapsed());
+    for axis in Axis::LINEAR {
+        let [a, b] = [&fine, &coarse].map(|plant| {
+            let growth = screw_growth_um(plant, axis);
+            growth[4] - growth[0]
+        });
+        assert!((b / a - 1.0).abs() < 0.03, "{axis}: {a} {b}");
+    }
+    for place in [Place::SpindleFront, Place::Head, Place::Bed] {
+        let [a, b] = [&fine, &coarse].map(|plant| plant.true_temp_degc(place) - 20.0);
+        assert!((a - b).abs() < 0.01, "{place}: {a} {b}");
+    }
+}
+
+#[test]
+fn a_machine_that_is_off_cools_whatever_stands_in_its_file() {
+    let mut file = truth();
+    file.heat.standing_heat_w.insert(Place::Bed, 500.0);
+    file.heat.shop_air.day_amplitude_k = 0.0;
+    file.heat.shop_air.draught_k = 0.0;
+    let mut plant = Plant::new(&machine(), &file).unwrap();
+    let bed_degc = |plant: &mut Plant, is_on: bool, hours: u32| {
+        plant.switch(is_on);
+        for _ in 0..hours * 60 {
+            plant.work(&PerAxis::default(), 0.0, Span::from_nanos(60_000_000_000));
+        }
+        plant.true_temp_degc(Place::Bed)
+    };
+    let warm = bed_degc(&mut plant, true, 6);
+    let cold = bed_degc(&mut plant, false, 12);
+    assert!(
+        warm > 21.0 && cold - 20.0 < 0.7 * (warm - 20.0),
+        "{warm} {cold}"
+    );
 }
 
 /// Points of the blocks' span, (-220, -180, 20) to (220, 180, 200).

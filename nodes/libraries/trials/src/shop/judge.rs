@@ -7,6 +7,7 @@ use gap_diagnosis::GapReport;
 use gap_diagnosis::report::Status;
 use serde::{Deserialize, Serialize};
 
+use super::change::{ReportedChange, changes_of};
 use super::truth::{Follow, Name, ShopEffect, ShopTruth};
 use crate::verdict::{SaidCause, Verdict};
 
@@ -18,6 +19,9 @@ pub struct Answer {
     pub does_not_repeat: usize,
     /// Thermometers that the log goes with, by the page's remark.
     pub follows: Vec<Follow>,
+    /// Change points of the report.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub changes: Vec<ReportedChange>,
 }
 
 /// What a report and its page add to the causes.
@@ -26,6 +30,7 @@ pub fn answer(report: &GapReport, page: &str) -> Answer {
     Answer {
         does_not_repeat: report.does_not_repeat.len(),
         follows: follows_in(page),
+        changes: changes_of(report),
     }
 }
 
@@ -190,6 +195,7 @@ mod tests {
             white_um: 0.2,
             between_runs_um: 0.1,
             memory: 0.0,
+            shift: None,
         }
     }
 

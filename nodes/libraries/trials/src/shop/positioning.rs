@@ -113,6 +113,7 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
             white_um: floor.white_um,
             between_runs_um: floor.between_runs_um,
             memory: floor.memory,
+            shift: None,
         },
     }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::change::reported;
 use super::judge::{Call, followed, has_alarm, is_found, wrong_names};
 use super::truth::{ShopEffect, ShopTruth};
 use crate::arm::Arm;
@@ -18,6 +19,11 @@ const MIDDLE_D: f64 = 10.0;
 const MUCH_MEMORY: f64 = 0.5;
 /// Errors of lag and growth that are allowed.
 const MAX_LAG_ERROR: f64 = 0.25;
+/// What should be closed of what an oracle closes, and how long a diagnosis of a shift may take, s; each in the middle, so
+/// that half of all are to reach it.
+const LEAST_OF_ORACLE: f64 = 0.95;
+const LONGEST_OF_SHIFT_S: f64 = 5.0;
+const HALF: f64 = 0.5;
 const MAX_GROWTH_ERROR: f64 = 0.10;
 
 /// One figure beside its target.
@@ -173,7 +179,79 @@ fn lines(arm: Arm, all: &[Judged<'_>], answered: &[Judged<'_>]) -> Vec<Line> {
     if arm == Arm::ShopLogs {
         lines.extend(of_temperatures(&large));
     }
+    if arm == Arm::ShopShift {
+        lines.extend(of_changes(answered));
+        lines.extend(of_shifts(answered));
+    }
     lines
+}
+
+/// How many of the large changes the report has with their time, and changes that are none.
+fn of_changes(answered: &[Judged<'_>]) -> [Line; 4] {
+    let all = || answered.iter().flat_map(|(verdict, _)| reported(verdict));
+    let found = |fits: fn(Option<f64>) -> bool| {
+        let large =
+            all().filter(|(change, effect, _)| effect.d > MIN_D_TO_FIND && fits(change.until_s));
+        Proportion::of(large.map(|(.., is_reported)| is_reported))
+    };
+    let steady = answered.iter().filter(|(_, truth)| {
+        let changes = truth.shift.as_ref().map(|shift| shift.changes.len());
+        changes == Some(0)
+    });
+    let invented = steady.map(|(verdict, _)| {
+        let answer = verdict.shop.as_ref();
+        answer.is_some_and(|answer| !answer.changes.is_empty())
+    });
+    [
+        Line::of(
+            "D above 20: what changed has its time",
+            found(|_| true),
+            Some(0.85),
+            true,
+        ),
+        Line::of(
+            "of these: at once",
+            found(|until| until.is_none()),
+            None,
+            true,
+        ),
+        Line::of(
+            "of these: for a while",
+            found(|until| until.is_some()),
+            None,
+            true,
+        ),
+        Line::of(
+            "nothing changed: a change reported",
+            Proportion::of(invented),
+            None,
+            false,
+        ),
+    ]
+}
+
+/// Gap closed and time of the diagnosis of shifts.
+fn of_shifts(answered: &[Judged<'_>]) -> [Line; 2] {
+    let large = answered.iter().filter(|(_, truth)| {
+        let mut effects = truth.effects.iter();
+        effects.any(|effect| effect.d > MIN_D_TO_FIND)
+    });
+    let closed = large.filter_map(|(verdict, _)| verdict.closed_of_oracle());
+    let times = answered.iter().map(|(verdict, _)| verdict.diagnosis_s);
+    [
+        Line::of(
+            "D above 20: closes 0.95 or more of the oracle's gap (median: half of them)",
+            Proportion::of(closed.map(|share| share >= LEAST_OF_ORACLE)),
+            Some(HALF),
+            true,
+        ),
+        Line::of(
+            "diagnosed within 5 s (median: half of them)",
+            Proportion::of(times.map(|time_s| time_s <= LONGEST_OF_SHIFT_S)),
+            Some(HALF),
+            true,
+        ),
+    ]
 }
 
 /// What was named in whole sessions.

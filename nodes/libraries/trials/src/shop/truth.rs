@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 pub type Name = (String, String);
 
 /// A name from its parts.
-pub(super) fn name(effect: &str, axis: &str) -> Name {
+pub(crate) fn name(effect: &str, axis: &str) -> Name {
     (effect.to_owned(), axis.to_owned())
 }
 
@@ -30,6 +30,33 @@ pub struct ShopTruth {
     pub between_runs_um: f64,
     /// What a reading keeps of the noise of the one before.
     pub memory: f64,
+    /// Runs and changes of a shift.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shift: Option<ShiftTruth>,
+}
+
+/// What is true of the course of a shift.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShiftTruth {
+    /// Its runs: number, and begin since the session began, s.
+    pub runs_s: Vec<(u32, f64)>,
+    /// What changes.
+    pub changes: Vec<TrueChange>,
+}
+
+/// What changes during a shift.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrueChange {
+    /// Its place among the hidden effects.
+    pub effect: usize,
+    /// When it begins, since the session began, s.
+    pub from_s: f64,
+    /// When it ends, s; none where it changes at once.
+    pub until_s: Option<f64>,
+    /// Time from one test that shows it to the next, s.
+    pub cycle_s: f64,
 }
 
 /// One hidden effect.
