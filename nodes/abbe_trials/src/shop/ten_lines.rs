@@ -14,24 +14,30 @@ pub fn ten_lines(arms: &[ShopTally]) -> Vec<String> {
         Arm::ShopShift,
     ]
     .map(of);
-    let nothing = "nothing hidden: a cause named";
-    let wrong = "a wrong name";
-    vec![
-        format!(
-            "A name was wrong, or alone where only a set was right, in {} of laser runs, {} of ballbars, {} of logs, {} of \
-             shifts.",
-            share(laser, wrong),
-            share(ballbar, wrong),
-            share(logs, wrong),
-            share(shift, wrong)
-        ),
-        format!(
-            "A good machine was given a cause in {} of laser runs, {} of ballbars, {} of logs, {} of shifts.",
-            share(laser, nothing),
-            share(ballbar, nothing),
-            share(logs, nothing),
-            share(shift, nothing)
-        ),
+    let mut lines = of_all([laser, ballbar, logs, shift]);
+    lines.extend(of_a_laser(laser));
+    lines.extend(of_others(ballbar, logs));
+    lines.push(of_a_shift(shift));
+    lines
+}
+
+/// How often names were wrong, and good machines accused.
+fn of_all(arms: [Option<&ShopTally>; 4]) -> Vec<String> {
+    let [laser, ballbar, logs, shift] = arms.map(|tally| share(tally, "a wrong name"));
+    let wrong = format!(
+        "A name was wrong, or alone where only a set was right, in {laser} of laser runs, {ballbar} of ballbars, {logs} of \
+         logs, {shift} of shifts."
+    );
+    let [laser, ballbar, logs, shift] =
+        arms.map(|tally| share(tally, "nothing hidden: a cause named"));
+    let good = format!(
+        "A good machine was given a cause in {laser} of laser runs, {ballbar} of ballbars, {logs} of logs, {shift} of shifts."
+    );
+    vec![wrong, good]
+}
+
+fn of_a_laser(laser: Option<&ShopTally>) -> [String; 4] {
+    [
         format!(
             "Lost motion by a laser run: {}. It is always a set: one feed tells no more.",
             kinds(laser, "lost motion")
@@ -51,6 +57,11 @@ pub fn ten_lines(arms: &[ShopTally]) -> Vec<String> {
             by(laser, "repeats", &["1"]),
             by(laser, "repeats", &["3", "4", "5"])
         ),
+    ]
+}
+
+fn of_others(ballbar: Option<&ShopTally>, logs: Option<&ShopTally>) -> [String; 3] {
+    [
         format!(
             "By a ballbar: squareness {}; lost motion {}; reversal spike {}; servo mismatch {}.",
             kinds(ballbar, "squareness"),
@@ -72,20 +83,24 @@ pub fn ten_lines(arms: &[ShopTally]) -> Vec<String> {
             by(logs, MEMORY, &["none"]),
             by(logs, MEMORY, &["0.5 and more"])
         ),
-        format!(
-            "By a shift above D 20: a cause is named in {}, or in the set in {}; what changed has its time in {}; 0.95 or \
-             more of the oracle's gap is closed in {}.",
-            share(shift, "D above 20, resolvable: named"),
-            share(shift, "D above 20, not resolvable: in the set"),
-            share(shift, CHANGED),
-            share(shift, CLOSED)
-        ),
     ]
+}
+
+fn of_a_shift(shift: Option<&ShopTally>) -> String {
+    format!(
+        "By a shift above D 20: a cause is named in {}, or in the set in {}; what changed has its time in {}; 0.95 or more \
+         of the oracle's gap is closed in {}.",
+        share(shift, "D above 20, resolvable: named"),
+        share(shift, "D above 20, not resolvable: in the set"),
+        share(shift, CHANGED),
+        share(shift, CLOSED)
+    )
 }
 
 /// Figures of a shift.
 const CHANGED: &str = "D above 20: what changed has its time";
-const CLOSED: &str = "D above 20: closes 0.95 or more of the oracle's gap (median: half of them)";
+const CLOSED: &str =
+    "D above 20, all with names: closes 0.95 of the oracle's gap (median: half of them)";
 /// Title of the split by noise.
 const MEMORY: &str = "noise that neighbouring readings share";
 const NOT_TRIED: &str = "not tried";

@@ -34,8 +34,9 @@ fn a_shift_lasts_four_hours_and_nothing_of_production_is_sampled_quickly() {
 }
 
 #[test]
-fn a_good_machine_stays_within_a_micrometre_over_its_shift() {
-    let bench = bench(5);
+fn a_good_machine_hardly_drifts_over_its_shift() {
+    let mut bench = bench(5);
+    bench.rig.scatter.between_runs_mm = 0.0;
     let mut first = std::collections::BTreeMap::<String, f64>::new();
     let mut most_um = 0.0_f64;
     measure(&bench.rig, &mut |_, sample| {
@@ -46,6 +47,7 @@ fn a_good_machine_stays_within_a_micrometre_over_its_shift() {
         }
     })
     .unwrap();
+    // Two touches of a repeatability of 0.3 µm differ by 1.3 µm at most, three times their deviation.
     assert!(first.len() == 6 && most_um < 2.5, "{most_um} {first:?}");
 }
 
@@ -70,10 +72,10 @@ fn a_clamp_that_slips_by_ten_micrometres_is_as_large_as_its_touches_say() {
 }
 
 #[test]
-fn a_number_always_draws_the_same_shift() {
-    let draw = |index| ShiftTrial::draw(9, index).unwrap();
+fn a_number_always_draws_the_same_shift_and_another_one_another() {
+    let draw = |index| Bench::draw(&mut stream(Arm::ShopShift, 9, index)).unwrap();
     let (one, again, other) = (draw(0), draw(0), draw(1));
-    assert_eq!(one.truth, again.truth);
     assert_eq!(one.rig, again.rig);
+    assert_eq!(one.timeline.runs, again.timeline.runs);
     assert_ne!(one.rig.machine, other.rig.machine);
 }

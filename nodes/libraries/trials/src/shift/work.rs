@@ -139,7 +139,8 @@ pub(super) fn production(random: &mut Pcg64Mcg, part: &Spell, length_s: f64) -> 
     let mut all = vec![];
     let mut left_s = length_s;
     while left_s > 1.0 {
-        let own_s = log_uniform(random, [180.0, 1200.0]).min(left_s);
+        // Whole seconds are whole steps.
+        let own_s = log_uniform(random, [180.0, 1200.0]).min(left_s).floor();
         let is_pause = random.random::<f64>() < 0.2;
         all.push(if is_pause {
             Spell::rest(own_s, true)

@@ -12,7 +12,7 @@ use super::{Block, Deviations};
 use crate::scatter::Scatter;
 
 /// Share of its square below which a direction counts as taken out.
-const TAKEN_OUT: f64 = 1e-6;
+const TAKEN_OUT_OF_GRAM: f64 = 1e-6;
 
 impl Deviations {
     /// The readings of `without` with the signatures of `self` and of another one.
@@ -67,7 +67,7 @@ fn left_of_last(mut gram: DMatrix<f64>) -> f64 {
     let last = gram.nrows() - 1;
     for k in 0..last {
         let own = gram[(k, k)];
-        if own <= TAKEN_OUT * before[(k, k)] || own <= 0.0 {
+        if own <= TAKEN_OUT_OF_GRAM * before[(k, k)] || own <= 0.0 {
             continue;
         }
         let (column, row) = (gram.column(k).clone_owned(), gram.row(k).clone_owned());
