@@ -63,14 +63,12 @@ pub enum Reason {
 impl Reason {
     /// Whether something could not be used that the recording should have had. What was not completed, no method
     /// uses or is used all the same is no loss: runs that the machine broke off, readings with a turned rotary axis, segments
-    /// and clocks that came otherwise.
+    /// and clocks that came otherwise, samples of a live run that came twice or behind a newer one.
     #[must_use]
     pub const fn is_loss(self) -> bool {
         match self {
             Self::NotFinite
             | Self::OtherMachine
-            | Self::WentBack
-            | Self::ToldBefore
             | Self::InGap
             | Self::HoleInMotion
             | Self::Beyond
@@ -83,6 +81,8 @@ impl Reason {
             | Self::TooLong
             | Self::TooMuch => true,
             Self::ClockJump
+            | Self::WentBack
+            | Self::ToldBefore
             | Self::RotaryTurned
             | Self::Failed
             | Self::SegmentLate
