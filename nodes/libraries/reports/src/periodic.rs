@@ -245,7 +245,6 @@ mod tests {
     use std::path::Path;
 
     use machine::MachineFile;
-    use nalgebra::Vector3;
 
     use super::*;
     use crate::evaluate::linear::Reference;
@@ -275,23 +274,8 @@ mod tests {
         let run: Vec<f64> = targets_mm.iter().map(wave).collect();
         for (reference, is_own) in [(Reference::Scale, true), (Reference::Length, false)] {
             let test = LinearTest {
-                kind: TestKind::Positioning,
-                axis: Some(Axis::X),
-                name: "X".to_owned(),
-                first_run: 3,
-                runs: vec![3],
-                feed_mm_s: 100.0,
                 reference,
-                direction: Vector3::x(),
-                place_mm: None,
-                targets_mm: targets_mm.clone(),
-                up_mm: vec![run.clone(); 5],
-                mean_mm: 0.0,
-                outlying: Default::default(),
-                down_mm: vec![run.clone(); 5],
-                left_out: vec![],
-                compensated: false,
-                longest_rest: None,
+                ..LinearTest::along_x(3, targets_mm.clone(), run.clone())
             };
             let tests = Tests {
                 linear: vec![test],
@@ -330,25 +314,8 @@ mod tests {
             "X, run 3 on: not evaluated: targets lie 15 mm apart. X, run 15 on; X, run 46 on: not evaluated: targets lie 20 mm apart."
         );
         let machine = include_str!("../../../../launch_configs/dual_loop/machine.yaml");
-        let wide = |run: u32| LinearTest {
-            kind: TestKind::Positioning,
-            axis: Some(Axis::X),
-            name: "X".to_owned(),
-            first_run: run,
-            runs: vec![run],
-            feed_mm_s: 100.0,
-            reference: Reference::Length,
-            direction: Vector3::x(),
-            place_mm: None,
-            targets_mm: (0..9).map(|k| 20.0 * f64::from(k)).collect(),
-            up_mm: vec![vec![0.0; 9]; 5],
-            down_mm: vec![vec![0.0; 9]; 5],
-            left_out: vec![],
-            mean_mm: 0.0,
-            outlying: Default::default(),
-            compensated: false,
-            longest_rest: None,
-        };
+        let targets_mm: Vec<f64> = (0..9).map(|k| 20.0 * f64::from(k)).collect();
+        let wide = |run: u32| LinearTest::along_x(run, targets_mm.clone(), vec![0.0; 9]);
         let tests = Tests {
             linear: [3, 15, 46].map(wide).to_vec(),
             machine: Some(MachineFile::parse(machine, "machine.yaml").unwrap()),

@@ -72,6 +72,32 @@ pub struct LinearTest {
     pub longest_rest: Option<Span>,
 }
 
+#[cfg(test)]
+impl LinearTest {
+    /// Five runs along X with the same readings up and down, for tests.
+    pub(crate) fn along_x(run: u32, targets_mm: Vec<f64>, read_mm: Vec<f64>) -> Self {
+        Self {
+            kind: TestKind::Positioning,
+            axis: Some(Axis::X),
+            name: "X".to_owned(),
+            first_run: run,
+            runs: vec![run],
+            feed_mm_s: 100.0,
+            reference: Reference::Length,
+            direction: Vector3::x(),
+            place_mm: None,
+            targets_mm,
+            up_mm: vec![read_mm.clone(); 5],
+            down_mm: vec![read_mm; 5],
+            mean_mm: 0.0,
+            outlying: Default::default(),
+            left_out: vec![],
+            compensated: false,
+            longest_rest: None,
+        }
+    }
+}
+
 /// One rest of the command.
 #[derive(Clone, Copy, Debug)]
 struct Stop {

@@ -103,10 +103,6 @@ fn artefacts(tests: &Tests) -> Option<Needs> {
 mod tests {
     use std::path::Path;
 
-    use metrology::Axis;
-    use metrology::sample::TestKind;
-    use nalgebra::Vector3;
-
     use super::super::tests::WHOLE;
     use super::*;
 
@@ -123,23 +119,9 @@ mod tests {
 
     fn laser(reference: Reference) -> Tests {
         let test = LinearTest {
-            kind: TestKind::Positioning,
-            axis: Some(Axis::X),
             name: "X along_x".to_owned(),
-            first_run: 3,
-            runs: vec![3],
-            feed_mm_s: 100.0,
             reference,
-            direction: Vector3::x(),
-            place_mm: None,
-            targets_mm: vec![0.0, 100.0],
-            up_mm: vec![vec![0.0; 2]; 5],
-            down_mm: vec![vec![0.0; 2]; 5],
-            left_out: vec![],
-            mean_mm: 0.0,
-            outlying: Default::default(),
-            compensated: false,
-            longest_rest: None,
+            ..LinearTest::along_x(3, vec![0.0, 100.0], vec![0.0; 2])
         };
         Tests {
             linear: vec![test],
