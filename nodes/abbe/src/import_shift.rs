@@ -242,7 +242,7 @@ impl ImportShift {
         }
     }
 
-    /// Times of which the log says nothing: what it said last holds in the programs.
+    /// Warns of times without a line: the last logged values hold in the programs.
     fn warn_of_silence(&self, shift: &Shift) {
         let log = self.log.display();
         let named = |spans: &[(Stamp<Machine>, Stamp<Machine>)]| {

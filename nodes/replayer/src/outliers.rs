@@ -1,8 +1,8 @@
 //! Readings of thermometers that are no temperatures: a sensor that drops out reads 0, or the end of its range, for a moment.
 //!
 //! A reading is an outlier where three of the four beside it are more than [`FAR_K`] from it and agree among themselves: no body
-//! of a machine changes by so much from one reading to the next and back. A step that lasts is none, nor is anything among fewer
-//! than four readings.
+//! of a machine changes by so much from one reading to the next and back. A step that lasts is no outlier, and fewer than
+//! four readings have no outlier.
 
 use std::collections::VecDeque;
 

@@ -67,7 +67,7 @@ fn by_sign(name: &str) -> Option<Direction> {
     Direction::of_word(sign).filter(|_| is_numbered && !sign.is_empty())
 }
 
-/// The direction of a word; a number and what is short for a position are none.
+/// The direction that a word names; `None` for a number and for short names of positions.
 fn of_word(word: &str) -> Option<Direction> {
     let is_other = word.parse::<f64>().is_ok() || word == "pos" || word == "neg";
     Direction::of_word(word).filter(|_| !is_other)

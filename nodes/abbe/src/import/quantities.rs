@@ -40,7 +40,7 @@ const ROLE_WORDS: [(Role, &[&str], &[&str]); 9] = [
         &["x", "y", "z"],
     ),
 ];
-/// Begins of words of statistics, limits, other errors and what was worked out: a reading is none of them.
+/// First letters of words for statistics, limits, other errors and computed values. A column with such a word has no readings.
 const OF_NO_READING: &[&str] = &[
     "limit",
     "grenz",
@@ -88,7 +88,7 @@ const OF_NO_READING_WHOLE: &[&str] = &[
     "tol", "avg", "ave", "std", "rms", "min", "max", "fit", "spec", "ucl", "lcl", "usl", "lsl",
     "yaw", "roll", "sd", "2s", "3s",
 ];
-/// Roles that a statistic or a limit has none of.
+/// Roles that no column of statistics or limits has.
 const OF_READINGS: [Role; 5] = [
     Role::Radial,
     Role::Deviation,

@@ -321,7 +321,7 @@ impl File {
         Ok(passes)
     }
 
-    /// Leaves out the passes back of a test from one side; a doubt where all passes go one way and the flags tell of two.
+    /// Leaves out the return passes of a test from one side. Returns a doubt where all passes go one way and the flags state two.
     fn one_way(&self, passes: &mut Passes) -> Vec<String> {
         let flags: Vec<&str> = self
             .value("TARGET DATA", "flags")

@@ -145,7 +145,7 @@ fn middle(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Checks that the noise of the repeats is the session's: the middle channel's. A channel whose noise is worse gets a note. Logs
-/// without repeats have the noise of neighbouring rows: what is left of them beside it is no noise, but what the effects lack.
+/// without repeats have the noise of neighbouring rows. Anything beyond it is an error of the effects, not noise.
 pub fn judge(
     inflation: &BTreeMap<Channel, f64>,
     config: &GapConfig,

@@ -68,7 +68,7 @@ pub(crate) fn list_periodic(stack: &Stack<'_>, signatures: &Library, members: &m
     }
 }
 
-/// (1); none where the curve is nothing or the axis has no lead.
+/// (1); `None` where the curve is zero or the axis has no lead.
 fn cosine(stack: &Stack<'_>, axis: metrology::Axis, curve: &DVector<f64>) -> Option<f64> {
     let lead_mm = stack.twin.machine().linear(axis)?.lead_mm;
     let mut columns = [vec![0.0; stack.rows.len], vec![0.0; stack.rows.len]];

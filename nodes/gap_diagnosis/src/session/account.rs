@@ -150,12 +150,12 @@ impl Account {
         self.lines(|_| true)
     }
 
-    /// What of it is a loss of the recording, in words.
+    /// The entries that are a loss of the recording, in words.
     pub fn losses(&self) -> impl Iterator<Item = String> {
         self.lines(Reason::is_loss)
     }
 
-    /// What of it is none.
+    /// The other entries, in words.
     pub fn notes(&self) -> impl Iterator<Item = String> {
         self.lines(|reason| !reason.is_loss())
     }

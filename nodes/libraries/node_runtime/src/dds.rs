@@ -133,7 +133,7 @@ struct Others {
     _peers: Option<Peers>,
 }
 
-/// What is said of named hosts where nothing can be done.
+/// Message where named hosts cannot be reached.
 const UNREACHED: &str = "ROS_STATIC_PEERS is not followed: the graph is encrypted and no interface has the MULTICAST flag; \
     `ip link set DEVICE multicast on` cures it, also where the network carries none";
 

@@ -181,7 +181,7 @@ fn corrected(evidence: &Evidence) -> Vec<(f64, f64)> {
     used.into_iter().map(from_mean).collect()
 }
 
-/// Touches over feed, as latched and corrected; `None` where there is none of either.
+/// Touches over feed, as latched and corrected; `None` where there are no touches.
 ///
 /// # Errors
 /// When the plot cannot be drawn.

@@ -39,7 +39,7 @@ pub struct Shift {
     pub doubtful: Vec<DoubtfulSpeed>,
     /// Spans of the range in which the log does not say how fast the spindle turns: it stands in the programs.
     pub without_spindle: Vec<(Stamp<Machine>, Stamp<Machine>)>,
-    /// Spans of the range, longer than a line of the programs, in which the log has no line: what it said last holds.
+    /// Spans of the range, longer than a line of the programs, in which the log has no line: its last values hold.
     pub silent: Vec<(Stamp<Machine>, Stamp<Machine>)>,
     /// Whether nothing is missing that would change the programs.
     pub is_whole: bool,

@@ -182,7 +182,7 @@ fn an_agent_that_refuses_a_number_since_it_counts_anew_is_reported() {
     assert_eq!(talk.asked().last(), Some(&"/sample?from=4"));
 }
 
-/// An agent that calls every number out of range tells nothing: its machine would look as if it stood.
+/// An agent that calls every number out of range sends no values: its machine would seem to stand.
 #[test]
 fn an_agent_that_refuses_every_number_is_reported() {
     let mut talk = Talk::begun();

@@ -171,7 +171,7 @@ pub fn within_half_a_turn_rad(angle_rad: f64) -> f64 {
 ///
 /// # Errors
 /// No runs, one run of a side beside more of the other, fewer than two targets, targets that do not ascend, lists that do not
-/// fit together, a number that is none, a budget with a negative entry.
+/// fit together, a value that is not finite, a budget with a negative entry.
 pub fn evaluate(runs: &RotaryRuns, budget: &RotaryBudget) -> Result<RotaryResult, Iso230Error> {
     runs.check()?;
     budget.check()?;

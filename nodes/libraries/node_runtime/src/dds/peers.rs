@@ -6,7 +6,7 @@
 //! | interfaces | what is done |
 //! |---|---|
 //! | one has multicast | what our participant sends to the group comes back here, by the loop of its own sockets. A copy goes to each named host: announcements to the ports of its first participants (RTPS 2.5, 9.6.2.3), the rest to those that are known there |
-//! | none has | RustDDS sends to each alone already. It is told of a stand-in for each named host: a participant that listens for announcements at those ports, and has nothing else |
+//! | none has | RustDDS sends to each alone already. It receives the announcement of a stand-in for each named host: a participant that only listens for announcements at those ports |
 //!
 //! A copy is the whole datagram: who hears it takes it as if the group had brought it. On an encrypted graph a stand-in has
 //! no credentials and is not believed: there the second row does not hold.
@@ -95,7 +95,7 @@ impl Way {
         Ok(Some(Self { hosts, own, loops }))
     }
 
-    /// Whether the participant must be told of stand-ins, which an encrypted graph does not believe.
+    /// Whether the participant needs announcements of stand-ins. An encrypted graph does not accept them.
     pub const fn needs_stand_ins(&self) -> bool {
         self.loops.is_none()
     }

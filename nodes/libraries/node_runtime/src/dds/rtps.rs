@@ -155,8 +155,8 @@ pub(super) fn alive(own: &Prefix, other: &Prefix) -> Vec<u8> {
     announcing(own, other, 1, &[])
 }
 
-/// The datagram by which `own` tells itself of a participant that listens for announcements at `addresses`, and does
-/// nothing else (8.5.4.2, 9.6.2.2, 9.6.3). `number` counts what was told of it.
+/// The datagram by which `own` announces to itself a participant that listens for announcements at `addresses`, and does
+/// nothing else (8.5.4.2, 9.6.2.2, 9.6.3). `number` counts its announcements.
 pub(super) fn stand_in(
     own: &Prefix,
     other: &Prefix,

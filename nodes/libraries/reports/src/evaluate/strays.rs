@@ -12,7 +12,7 @@ use replayer::Reason;
 
 /// No linear axis is faster, mm/s.
 const FASTEST_MM_S: f64 = 5_000.0;
-/// A shorter leap is none, mm: many states may be received at one instant.
+/// Least step that counts as a leap, mm: many states may be received at one instant.
 const LEAST_LEAP_MM: f64 = 10.0;
 
 /// Judges the axis states of a bag in their order.

@@ -219,7 +219,7 @@ impl TestConditions {
         }
     }
 
-    /// Whether a test is under way; a program of production is none.
+    /// Whether a test is under way; production does not count as a test.
     fn is_in_test(&self) -> bool {
         let segment = self.under_way.as_ref();
         segment.is_some_and(|segment| segment.kind != TestKind::Production)

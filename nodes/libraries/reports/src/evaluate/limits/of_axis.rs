@@ -30,7 +30,7 @@ impl Limits {
     /// The tests with a figure that a name of a limit is for: those of its axis, or those of which no axis has an own limit.
     ///
     /// # Errors
-    /// When no test has such a figure, or the axis is none; with the figures that there are.
+    /// When no test has such a figure, or the axis does not exist. The message lists the figures that exist.
     pub(super) fn found<'t>(
         &self,
         name: &str,
