@@ -38,6 +38,9 @@ pub enum TextError {
     /// The whole file is in another encoding.
     #[error("1:1: the file is UTF-16: save it as UTF-8")]
     Utf16,
+    /// The same, with four bytes a letter.
+    #[error("1:1: the file is UTF-32: save it as UTF-8")]
+    Utf32,
 }
 
 /// Replaces a byte of a comment that is not UTF-8.
@@ -48,6 +51,9 @@ const REPLACEMENT: char = '\u{FFFD}';
 /// # Errors
 /// Line and column of the first byte that is not UTF-8 outside of comments.
 pub fn decode(bytes: &[u8], comments: Comments) -> Result<String, TextError> {
+    if bytes.starts_with(&[0xFF, 0xFE, 0, 0]) || bytes.starts_with(&[0, 0, 0xFE, 0xFF]) {
+        return Err(TextError::Utf32);
+    }
     if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
         return Err(TextError::Utf16);
     }

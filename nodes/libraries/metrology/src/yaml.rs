@@ -5,6 +5,7 @@
 //! reading know a key and no line; [`Places`] gives them the line.
 
 mod base;
+mod culprit;
 mod homes;
 mod places;
 mod words;
@@ -56,7 +57,8 @@ impl std::error::Error for YamlError {}
 /// # Errors
 /// Place, key, what stands there and what belongs there.
 pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, YamlError> {
-    serde_saphyr::from_str(text).map_err(|error| words::in_own_words(&error, text))
+    let again = |text: &str| serde_saphyr::from_str::<T>(text).err();
+    serde_saphyr::from_str(text).map_err(|error| words::in_own_words(&error, text, &again))
 }
 
 /// The same, where `axis: Y` is a letter and not the truth value that YAML 1.1 takes it for.
@@ -64,9 +66,10 @@ pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, YamlError> {
 /// # Errors
 /// As [`read`].
 pub fn read_letters<T: DeserializeOwned>(text: &str) -> Result<T, YamlError> {
-    let options = serde_saphyr::options! { strict_booleans: true };
-    serde_saphyr::from_str_with_options(text, options)
-        .map_err(|error| words::in_own_words(&error, text))
+    let options = || serde_saphyr::options! { strict_booleans: true };
+    let again = |text: &str| serde_saphyr::from_str_with_options::<T>(text, options()).err();
+    serde_saphyr::from_str_with_options(text, options())
+        .map_err(|error| words::in_own_words(&error, text, &again))
 }
 
 /// A message about the text of a file with the file's name and, where the message begins with a place or with a key of

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use metrology::yaml;
 use serde::Deserialize;
 
 use super::TopicInfo;
@@ -50,13 +51,9 @@ pub(super) fn faults(text: Result<&str, &String>, topics: Option<&[TopicInfo]>) 
         Ok(text) => text,
         Err(reason) => return vec![reason.clone()],
     };
-    let description = match serde_saphyr::from_str::<Root>(text) {
+    let description = match yaml::read::<Root>(text) {
         Ok(root) => root.rosbag2_bagfile_information,
-        Err(error) => {
-            let error = error.to_string();
-            let first = error.lines().next().unwrap_or_default();
-            return vec![format!("the description is damaged: {first}")];
-        }
+        Err(error) => return vec![format!("the description is damaged: {error}")],
     };
     let missing = missing(&description);
     let mut faults: Vec<String> = missing

@@ -65,7 +65,8 @@ impl Places {
     pub fn of(text: &str) -> Self {
         let mut places = Self::default();
         let mut open: Vec<Open> = vec![];
-        let mut parser = Parser::new_from_str(text);
+        let options = granit_parser::options! { emit_unresolved_aliases: true };
+        let mut parser = Parser::new_from_str_with_options(text, options);
         while let Some(Ok((event, span))) = parser.next_event() {
             match event {
                 Event::Scalar(text, style, ..) => {
@@ -73,10 +74,9 @@ impl Places {
                     let text = text.into_owned();
                     places.scalar(&mut open, Kind::Scalar { text, is_quoted }, span);
                 }
-                Event::Alias(_) => {
-                    let text = "*".to_owned();
-                    let is_quoted = false;
-                    places.scalar(&mut open, Kind::Scalar { text, is_quoted }, span);
+                Event::Alias(_) => places.scalar(&mut open, Kind::alias(""), span),
+                Event::UnresolvedAlias(name) => {
+                    places.scalar(&mut open, Kind::alias(&name), span);
                 }
                 Event::SequenceStart(..) => places.begin(&mut open, Kind::List, span),
                 Event::MappingStart(..) => places.begin(&mut open, Kind::Map, span),
@@ -297,6 +297,66 @@ impl Places {
             .collect()
     }
 
+    /// The text again, in one line, with no other children of `node` than those of `kept`; `None` where an alias or a second
+    /// document stands in it.
+    pub(super) fn with_only(&self, node: usize, kept: &[usize]) -> Option<String> {
+        let mut text = String::new();
+        let mut open: Vec<(usize, &str)> = vec![];
+        let mut is_out = vec![false; self.nodes.len()];
+        for (at, one) in self.nodes.iter().enumerate() {
+            let parent = one.parent;
+            if at > 0 && parent.is_none() || one.kind.is_alias() {
+                return None;
+            }
+            let is_cut = parent == Some(node) && !kept.contains(&at);
+            is_out[at] = is_cut || parent.is_some_and(|parent| is_out[parent]);
+            if is_out[at] {
+                continue;
+            }
+            while let Some((_, end)) = open.pop_if(|(container, _)| Some(*container) != parent) {
+                text.push_str(end);
+            }
+            if at > 0 && !text.ends_with(['[', '{']) {
+                text.push_str(", ");
+            }
+            if let Segment::Key(name) = &one.segment {
+                text.push_str(&format!("{}: ", quoted(name)));
+            }
+            match &one.kind {
+                Kind::Scalar {
+                    text: value,
+                    is_quoted,
+                } => {
+                    text.push_str(&scalar(value, *is_quoted));
+                }
+                Kind::List => {
+                    text.push('[');
+                    open.push((at, "]"));
+                }
+                Kind::Map => {
+                    text.push('{');
+                    open.push((at, "}"));
+                }
+            }
+        }
+        text.extend(open.iter().rev().map(|(_, end)| *end));
+        Some(text)
+    }
+
+    /// The first alias that no anchor above it has, and its name.
+    pub(super) fn undefined(&self) -> Option<(usize, &str)> {
+        let mut aliases = self.nodes.iter().enumerate();
+        aliases.find_map(|(at, node)| {
+            let name = node.kind.unresolved().filter(|name| !name.is_empty())?;
+            Some((at, name))
+        })
+    }
+
+    /// Number of nodes.
+    pub(super) fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
     /// Number of values, where a list stands at a node.
     pub(super) fn list_length(&self, node: usize) -> Option<usize> {
         let node = &self.nodes[node];
@@ -316,6 +376,58 @@ impl Places {
             Kind::Map => format!("{} keys", node.n_children),
         }
     }
+}
+
+impl Kind {
+    /// An alias; with a name where no anchor above has it.
+    fn alias(name: &str) -> Self {
+        Self::Scalar {
+            text: format!("*{name}"),
+            is_quoted: false,
+        }
+    }
+
+    fn is_alias(&self) -> bool {
+        self.unresolved().is_some()
+    }
+
+    /// Name of an alias; empty where an anchor has it.
+    fn unresolved(&self) -> Option<&str> {
+        match self {
+            Self::Scalar {
+                text,
+                is_quoted: false,
+            } => text.strip_prefix('*'),
+            _ => None,
+        }
+    }
+}
+
+/// A scalar as it stands between commas.
+fn scalar(text: &str, is_quoted: bool) -> String {
+    let is_plain = |letter: char| letter.is_alphanumeric() || "+-._~/ ".contains(letter);
+    if !is_quoted && text.is_empty() {
+        "~".to_owned()
+    } else if !is_quoted && text.chars().all(is_plain) {
+        text.to_owned()
+    } else {
+        quoted(text)
+    }
+}
+
+fn quoted(text: &str) -> String {
+    let mut quoted = "\"".to_owned();
+    for letter in text.chars() {
+        match letter {
+            '"' | '\\' => quoted.extend(['\\', letter]),
+            _ if letter.is_control() => {
+                quoted.push_str(&format!("\\U{:08X}", u32::from(letter)));
+            }
+            _ => quoted.push(letter),
+        }
+    }
+    quoted.push('"');
+    quoted
 }
 
 fn at(span: Span) -> Place {

@@ -33,8 +33,32 @@ struct AxisEntry {
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 #[expect(dead_code, reason = "only the errors are looked at")]
 enum Step {
-    Wait { seconds: f64 },
-    Run { program: String },
+    Wait {
+        seconds: f64,
+    },
+    Run {
+        program: String,
+    },
+    Measure {
+        axis: Letter,
+        runs: u32,
+        #[serde(default)]
+        sense: Option<Way>,
+        #[serde(default)]
+        beams: Vec<[f64; 2]>,
+    },
+}
+
+#[derive(Debug, Deserialize)]
+enum Letter {
+    X,
+    Y,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Way {
+    Clockwise,
 }
 
 fn refused(text: &str) -> String {
@@ -165,6 +189,34 @@ fn every_error_names_place_key_value_and_what_belongs_there() {
         (
             "name: m\naxes: {}\nsteps:\n  - {do: sleep}\n",
             "\"sleep\" is not known here: must be one of wait, run",
+        ),
+        (
+            "name: m\naxes: {}\nsteps:\n  - do: measure\n    axis: x\n    runs: 3\n",
+            "5:11: steps[0].axis = x: \"x\" is not known here: must be one of X, Y",
+        ),
+        (
+            "name: m\naxes: {}\nsteps:\n  - do: wait\n    seconds: 1\n  - runs:\n    do: measure\n    axis: X\n",
+            "6:5: steps[1].runs = nothing: must be a whole number from",
+        ),
+        (
+            "name: m\naxes: {}\nsteps:\n  - {do: measure, axis: Y, runs: 2, sense: CW}\n",
+            "4:43: steps[0].sense = CW: \"CW\" is not known here: must be one of clockwise",
+        ),
+        (
+            "name: m\naxes: {}\nsteps:\n  - {do: measure, axis: Y, runs: 2, beams: [[1, 2], [1, x]]}\n",
+            "4:57: steps[0].beams[1][1] = x: must be a number",
+        ),
+        (
+            "name: m\naxes: {}\nsteps:\n  - {do: measure, axis: 'two: ''', runs: x, beams: x}\n",
+            "steps[0].axis = \"two: ",
+        ),
+        (
+            "name: m\naxes: {}\nsteps:\n  - {do: wait, seconds: *a}\n",
+            "4:25: steps[0].seconds: the name behind `*a` is not defined above by `&a`",
+        ),
+        (
+            "name: m\nis_on: true\naxes: *axes\n",
+            "3:7: axes: the name behind `*axes` is not defined above",
         ),
         (
             "name: m\naxes: {X: {lead_mm: 1.0}\nsteps: [\n",

@@ -3,6 +3,7 @@
 use serde_saphyr::budget::BudgetBreach;
 use serde_saphyr::{Budget, Error, Location};
 
+use super::culprit::{Again, culprit};
 use super::homes::home_of;
 use super::places::{Kind, Place, Places};
 use super::{YamlError, shown};
@@ -17,7 +18,7 @@ const LISTED: usize = 30;
     clippy::too_many_lines,
     reason = "a table of cases, read from top to bottom"
 )]
-pub(super) fn in_own_words(error: &Error, text: &str) -> YamlError {
+pub(super) fn in_own_words(error: &Error, text: &str, again: Again<'_>) -> YamlError {
     let location = location(error);
     let error = innermost(error);
     let places = Places::of(text);
@@ -28,6 +29,7 @@ pub(super) fn in_own_words(error: &Error, text: &str) -> YamlError {
         })
     });
     let node = find(error, &places, place);
+    let node = node.map(|node| culprit(error, &places, node, again).unwrap_or(node));
     let mut key = node.map(|node| places.path(node)).unwrap_or_default();
     let mut value = node.map(|node| places.value(node));
     let rule = match error {
@@ -52,6 +54,13 @@ pub(super) fn in_own_words(error: &Error, text: &str) -> YamlError {
                 key = joined(&key, field);
             }
             known_keys(field, expected)
+        }
+        Error::UnknownAnchor { .. } => {
+            value = None;
+            let name = places.undefined().map_or("", |(_, name)| name);
+            format!(
+                "the name behind `*{name}` is not defined above by `&{name}`: define it, or write the value out"
+            )
         }
         Error::DuplicateMappingKey { .. } => {
             value = None;
@@ -99,7 +108,7 @@ pub(super) fn in_own_words(error: &Error, text: &str) -> YamlError {
 }
 
 /// The error itself, without what it is wrapped in.
-fn innermost(error: &Error) -> &Error {
+pub(super) fn innermost(error: &Error) -> &Error {
     match error {
         Error::WithSnippet { error, .. } | Error::AliasError { error, .. } => innermost(error),
         other => other,
@@ -175,6 +184,7 @@ fn find(error: &Error, places: &Places, place: Option<Place>) -> Option<usize> {
             }
             named(node).or_else(|| named(around?)).or(Some(node))
         }
+        Error::UnknownAnchor { .. } => places.undefined().map(|(alias, _)| alias),
         Error::SerdeInvalidType { .. } | Error::SerdeInvalidValue { .. } => {
             match candidates(error, places, node).as_slice() {
                 [one] => Some(*one),
@@ -357,7 +367,6 @@ fn rule(error: &Error, key: &str) -> String {
         Error::MergeValueNotMapOrSeqOfMaps { .. } | Error::MergeKeyNotAllowed { .. } => {
             "the merge key `<<` needs an alias of keys with values: write the keys out".to_owned()
         }
-        Error::UnknownAnchor { .. } => "the name behind `*` is not defined above by `&`".to_owned(),
         Error::Message { msg, .. } | Error::SerdeVariantId { msg, .. } => own(msg, key),
         Error::Budget { breach, .. } => too_large(breach),
         Error::AliasReplayLimitExceeded { .. }
