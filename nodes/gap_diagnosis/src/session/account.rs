@@ -30,6 +30,9 @@ pub enum Reason {
     ClockJump,
     /// A reading between two axis states that lie too far apart.
     InGap,
+    /// A reading between two axis states at their usual distance, between which the acceleration changes too much for a
+    /// path that is known to 0.1 µm.
+    TooUneven,
     /// A run with a hole in the axis states while they moved.
     HoleInMotion,
     /// A reading that is further from its nominal value than any machine is.
@@ -62,8 +65,8 @@ pub enum Reason {
 
 impl Reason {
     /// Whether something could not be used that the recording should have had. What was not completed, no method
-    /// uses or is used all the same is no loss: runs that the machine broke off, readings with a turned rotary axis, segments
-    /// and clocks that came otherwise, samples of a live run that came twice or behind a newer one.
+    /// uses or is used all the same is no loss: runs that the machine broke off, readings with a turned rotary axis or at a
+    /// sharp turn of the path, segments and clocks that came otherwise, samples of a live run that came twice or behind a newer one.
     #[must_use]
     pub const fn is_loss(self) -> bool {
         match self {
@@ -83,6 +86,7 @@ impl Reason {
             Self::ClockJump
             | Self::WentBack
             | Self::ToldBefore
+            | Self::TooUneven
             | Self::RotaryTurned
             | Self::Failed
             | Self::SegmentLate
@@ -100,6 +104,9 @@ impl Reason {
             Self::ToldBefore => "touches were told before, or a later one before them",
             Self::ClockJump => "times the clock jumped back, or ahead by more than a week",
             Self::InGap => "readings lie in holes of the axis states",
+            Self::TooUneven => {
+                "readings lie where the acceleration changes too much for the rate of the axis states"
+            }
             Self::HoleInMotion => {
                 "runs lack axis states in the midst of their motion and are left out"
             }

@@ -12,6 +12,7 @@ use twin::{Channel, Motion};
 
 use super::account::{Account, Reason};
 use super::record::Record;
+use super::select::FULL_RATE;
 use super::standing::{Standing, both, standing};
 use super::thermometers;
 
@@ -263,8 +264,19 @@ impl Scope<'_> {
             let a = &self.motion.acceleration[axis];
             (a[next] - a[k]).abs() * dt_s * dt_s * OFF_PARABOLA
         };
-        if dt_s > GAP_S || self.motion.axes.iter().any(|axis| bow(axis) > BOW) {
+        if dt_s > GAP_S {
             return Err(Reason::InGap);
+        }
+        if self.motion.axes.iter().any(|axis| bow(axis) > BOW) {
+            let before = k
+                .checked_sub(1)
+                .map(|before| ticks[k].at - ticks[before].at);
+            let is_usual = before.is_some_and(|before| dt_s < FULL_RATE * before.as_secs_f64());
+            return Err(if is_usual {
+                Reason::TooUneven
+            } else {
+                Reason::InGap
+            });
         }
         Ok(k as f64 + (at - ticks[k].at).as_secs_f64() / dt_s)
     }

@@ -18,7 +18,7 @@ pub(crate) const HOLDS_FEED_S: f64 = 0.05;
 /// A command that changes by less stands, mm or rad.
 const STANDSTILL: f64 = 1e-6;
 /// Ticks further apart than this times the finest spacing are not at the full rate.
-const FULL_RATE: f64 = 1.5;
+pub(super) const FULL_RATE: f64 = 1.5;
 /// Stops that make a run one that is measured at its stops, where its segment does not say so.
 const LEAST_STOPS: usize = 3;
 

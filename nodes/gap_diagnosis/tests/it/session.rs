@@ -13,6 +13,7 @@ use nalgebra::Vector3;
 use twin::effects;
 use twin::{Channel, Session, Twin};
 
+mod coarse;
 mod order;
 
 const MACHINE: &str = include_str!("../../../../launch_configs/gap_first/machine.yaml");
