@@ -420,7 +420,10 @@ mod tests {
         for (bytes, words) in [
             (&b"<!DOCTYPE a><a/>"[..], "a document type"),
             (b"", "no element stands there"),
-            (b"<a><b>", "the text ends inside of an element"),
+            (
+                b"<a>\n <b>",
+                "no XML: 2:5: the text ends inside of an element",
+            ),
             (b"<a></b>", "</b> closes <a>"),
             (b"<a>&c;</a>", "&c; is not defined"),
             (b"<a", "no XML: 1:1: no element stands there"),

@@ -55,9 +55,14 @@ struct Proposing {
 
 /// A mapping for all items that have a meaning here.
 #[must_use]
-pub fn propose(items: &[DataItem]) -> Proposal {
+pub fn propose(all: &[DataItem]) -> Proposal {
     let mut proposing = Proposing::default();
-    let (in_work, plain): (Vec<_>, Vec<_>) = items.iter().partition(|item| is_in_work(item));
+    let (items, without_id): (Vec<_>, Vec<_>) = all.iter().partition(|item| !item.id.is_empty());
+    for item in without_id {
+        let reason = "it has no id: no value of an agent can be told to be its";
+        proposing.leave(item, reason.to_owned());
+    }
+    let (in_work, plain): (Vec<_>, Vec<_>) = items.into_iter().partition(|item| is_in_work(item));
     // Axes first, so that a path's position is proposed only where it tells something new.
     let (paths, single): (Vec<_>, Vec<_>) = plain
         .into_iter()
@@ -68,7 +73,7 @@ pub fn propose(items: &[DataItem]) -> Proposal {
             Err(reason) => proposing.leave(item, reason),
         }
     }
-    proposing.drop_commanded_alone(items);
+    proposing.drop_commanded_alone(all);
     let mut ignored = Vec::new();
     for item in in_work {
         let reason = proposing.why_not_in_work(item);

@@ -22,12 +22,12 @@ pub enum XmlFlaw {
 /// With line and column, when it is beyond a bound or no XML.
 pub fn parse(text: &str, most_bytes: usize) -> Result<roxmltree::Document<'_>, XmlFlaw> {
     xml_bounds::check(text, most_bytes).map_err(XmlFlaw::Beyond)?;
-    roxmltree::Document::parse(text).map_err(|error| XmlFlaw::NotXml(in_own_words(&error)))
+    roxmltree::Document::parse(text).map_err(|error| XmlFlaw::NotXml(in_own_words(&error, text)))
 }
 
 /// What is wrong with a text that is no XML, after its line and column: `2:7: </b> closes <a>`.
 #[must_use]
-pub fn in_own_words(error: &roxmltree::Error) -> String {
+pub fn in_own_words(error: &roxmltree::Error, text: &str) -> String {
     use roxmltree::Error;
     let what = match error {
         Error::DtdDetected => "a document type (`<!DOCTYPE`) is not read: remove it".to_owned(),
@@ -57,7 +57,19 @@ pub fn in_own_words(error: &roxmltree::Error) -> String {
         _ => "the text is no XML: check tags, quotes and brackets".to_owned(),
     };
     let at = error.pos();
-    format!("{}:{}: {what}", at.row, at.col)
+    let (line, column) = match error {
+        // Of a text that is cut the library names no place.
+        Error::UnclosedRootNode => end_of(text),
+        _ => (at.row as usize, at.col as usize),
+    };
+    format!("{line}:{column}: {what}")
+}
+
+/// Line and column behind a text.
+fn end_of(text: &str) -> (usize, usize) {
+    let last = text.rsplit('\n').next().unwrap_or(text);
+    let line = text.bytes().filter(|byte| *byte == b'\n').count() + 1;
+    (line, last.chars().count() + 1)
 }
 
 /// Longest reference that is looked for, bytes.
@@ -174,8 +186,9 @@ mod tests {
 
     #[test]
     fn a_reference_to_a_control_letter_is_no_ampersand_that_stands_alone() {
-        let error = roxmltree::Document::parse("<a>&#1;</a>").unwrap_err();
-        let words = in_own_words(&error);
+        let text = "<a>&#1;</a>";
+        let error = roxmltree::Document::parse(text).unwrap_err();
+        let words = in_own_words(&error, text);
         assert!(
             words.contains("a letter that may not stand in XML"),
             "{words}"

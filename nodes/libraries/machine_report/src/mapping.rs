@@ -313,6 +313,13 @@ impl Mapping {
         let (mut uses, mut units) = (BTreeMap::new(), BTreeMap::new());
         KEYS.check_amount(|| "values".to_owned(), "keys", file.values.len())?;
         for (key, meaning) in &file.values {
+            if key.trim().is_empty() {
+                return Err(MappingError::Name {
+                    key: "values".to_owned(),
+                    name: key.clone(),
+                    reason: "no data item has an empty key: write its id, or take the key out",
+                });
+            }
             uses.insert(key.clone(), meaning.checked(key)?);
             units.extend(meaning.unit().map(|unit| (key.clone(), unit)));
         }

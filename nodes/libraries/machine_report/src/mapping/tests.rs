@@ -37,6 +37,10 @@ fn what_does_not_fit_is_refused_by_key() {
             "axis X: a commanded position alone",
         ),
         (
+            "  \"\": {is: ignored}\n",
+            "values: name \"\": no data item has an empty key: write its id, or take the key out",
+        ),
+        (
             "  F: {is: text}\n  f: {is: execution}\n",
             "f: name \"f\": another key has it",
         ),
