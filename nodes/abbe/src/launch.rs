@@ -9,6 +9,8 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail};
 use metrology::bound::Bound;
 use mtconnect_bridge::xml;
+use node_runtime::Setup;
+use node_runtime::arguments::Arguments;
 use node_runtime::text_file::{self, Comments};
 
 /// One node of a scenario.
@@ -27,6 +29,8 @@ pub struct LaunchNode {
     /// How long it may take to end before it is killed: `sigterm_timeout` and `sigkill_timeout`
     /// together, as `ros2 launch` counts them; `None`: neither is said.
     pub ends_within: Option<Duration>,
+    /// Where it stands: file, line and column.
+    pub place: String,
 }
 
 /// Longest launch file, bytes: one of 100 nodes with 1,000 parameters each has less.
@@ -68,6 +72,27 @@ impl LaunchNode {
         }
         args
     }
+
+    /// Its arguments, read.
+    ///
+    /// # Errors
+    /// With the place of the node, when one of them is none.
+    pub fn arguments(&self) -> Result<Arguments> {
+        Arguments::parse(self.ros_args()).with_context(|| self.described())
+    }
+
+    /// Its parameters with their files.
+    ///
+    /// # Errors
+    /// With the place of the node, when an argument or a parameter file cannot be read.
+    pub fn setup(&self) -> Result<Setup> {
+        Setup::new(&self.exec, &self.arguments()?).with_context(|| self.described())
+    }
+
+    fn described(&self) -> String {
+        let place = if self.place.is_empty() { "" } else { ": " };
+        format!("{}{place}node {}", self.place, self.name)
+    }
 }
 
 /// Finds the one `*.launch.xml` in a scenario's folder.
@@ -103,7 +128,12 @@ pub fn read(path: &Path) -> Result<Vec<LaunchNode>> {
     let text = text_file::read(path, Comments::Xml).context("launch file")?;
     let folder = path.parent().unwrap_or_else(|| Path::new("."));
     let nodes = parse(&text, folder).and_then(of_own_names);
-    nodes.with_context(|| format!("launch file {}", path.display()))
+    let mut nodes = nodes.with_context(|| format!("launch file {}", path.display()))?;
+    for node in &mut nodes {
+        node.place = format!("{}:{}", path.display(), node.place);
+        node.arguments()?;
+    }
+    Ok(nodes)
 }
 
 /// The nodes, where each has a name of its own in its namespace.
@@ -140,7 +170,11 @@ fn parse(text: &str, folder: &Path) -> Result<Vec<LaunchNode>> {
     for child in elements() {
         let place = document.text_pos_at(child.range().start);
         match child.tag_name().name() {
-            "node" => nodes.push(node(child, folder).with_context(|| format!("at {place}"))?),
+            "node" => {
+                let mut read = node(child, folder).with_context(|| format!("at {place}"))?;
+                read.place = place.to_string();
+                nodes.push(read);
+            }
             other => bail!("{place}: <{other}> is not supported in a scenario (supported: <node>)"),
         }
     }
@@ -178,6 +212,7 @@ fn node(element: roxmltree::Node<'_, '_>, folder: &Path) -> Result<LaunchNode> {
         parameter_files: Vec::new(),
         parameters: Vec::new(),
         ends_within: ends_within(element)?,
+        place: String::new(),
     };
     for child in element.children().filter(roxmltree::Node::is_element) {
         let tag = child.tag_name().name();
@@ -191,6 +226,11 @@ fn node(element: roxmltree::Node<'_, '_>, folder: &Path) -> Result<LaunchNode> {
                 launched
                     .parameter_files
                     .push(substitute(from, folder)?.into());
+            }
+            ("param", None, Some(name), Some(_))
+                if launched.parameters.iter().any(|(other, _)| other == name) =>
+            {
+                bail!("<param name=\"{name}\"> stands there twice: keep one of them");
             }
             ("param", None, Some(name), Some(value)) => {
                 launched
@@ -267,7 +307,10 @@ mod tests {
                 "a document type (`<!DOCTYPE`) is not read: remove it",
             ),
             ("", "no element stands there"),
-            ("<launch><node>", "the text ends inside of an element"),
+            (
+                "<launch>\n<node>",
+                "2:7: the text ends inside of an element",
+            ),
             (
                 "<launch>\n  <node></launch>",
                 "2:9: </launch> closes <node>",
@@ -304,6 +347,36 @@ mod tests {
             nodes[0].ros_args().join(" "),
             "--ros-args -r __node:=probe -r __ns:=/m1 --params-file lc/probe.yaml -p queue_s:=2.0"
         );
+    }
+
+    #[test]
+    fn a_wrong_parameter_or_name_in_a_launch_file_is_told_with_its_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cell.launch.xml");
+        for (node, words) in [
+            (
+                "<node pkg='abbe' exec='probe' namespace='a b'/>",
+                "2:1: node probe: remap rule",
+            ),
+            (
+                "<node pkg='abbe' exec='probe'><param name='a' value='['/></node>",
+                "2:1: node probe: parameter `a:=[`",
+            ),
+            (
+                "<node pkg='abbe' exec='probe'><param name='a' value='1'/><param name='a' value='2'/></node>",
+                "at 2:1: <param name=\"a\"> stands there twice: keep one of them",
+            ),
+        ] {
+            std::fs::write(&path, format!("<launch>\n{node}\n</launch>")).unwrap();
+            let shown = format!("{:#}", read(&path).unwrap_err());
+            assert!(shown.contains(words), "{shown}");
+            assert!(shown.contains("cell.launch.xml"), "{shown}");
+        }
+        let node =
+            "<node pkg='abbe' exec='fake_cnc'><param name='servo_rate_hz' value='fast'/></node>";
+        std::fs::write(&path, format!("<launch>\n{node}\n</launch>")).unwrap();
+        let nodes = read(&path).unwrap();
+        assert!(nodes[0].place.ends_with("cell.launch.xml:2:1"));
     }
 
     #[test]

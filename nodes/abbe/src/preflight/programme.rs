@@ -11,15 +11,12 @@ use grid_encoder::recording::{Place, Recording};
 use machine::file::AxisEntry;
 use machine::{Kinematics, MachineFile};
 use metrology::Axis;
-use node_runtime::Setup;
-use node_runtime::arguments::Arguments;
 use node_runtime::text_file::{self, Comments};
 use sequencer::{Plan, Step, recordings};
 use sequencer_node::read_plan;
 use thermal_model::ThermalModelConfig;
 
 use super::dry_run::Beside;
-use crate::launch::LaunchNode;
 use crate::scenario::Scenario;
 
 /// Where an axis stands at the begin of a plan without a scenario, as a share of its travel: the head up,
@@ -160,7 +157,7 @@ fn of_scenario(folder: &Path, machine: Option<&Path>) -> Result<Planned> {
             folder.display()
         );
     };
-    let setup = setup(sequencer)?;
+    let setup = sequencer.setup()?;
     let (path, text) = setup.file_text("plan_file")?;
     let plan = read_plan(&text, &path)?;
     let own = setup.file_path("machine_file")?;
@@ -169,16 +166,16 @@ fn of_scenario(folder: &Path, machine: Option<&Path>) -> Result<Planned> {
         programs: programs(&plan, &path)?,
         plan,
         control: match find("fake_cnc") {
-            Some(node) => self::setup(node)?.config()?,
+            Some(node) => node.setup()?.config()?,
             None => control(&machine),
         },
         machine,
         fit: match find("grid_encoder") {
-            Some(node) => self::setup(node)?.config()?,
+            Some(node) => node.setup()?.config()?,
             None => GridEncoderConfig::default(),
         },
         thermal_model: match find("thermal_model") {
-            Some(node) => Some(self::setup(node)?.config()?),
+            Some(node) => Some(node.setup()?.config()?),
             None => None,
         },
         what: String::new(),
@@ -249,11 +246,6 @@ fn programs(plan: &Plan, plan_path: &Path) -> Result<BTreeMap<String, String>> {
         Ok((program.clone(), text))
     };
     named.map(read).collect()
-}
-
-fn setup(node: &LaunchNode) -> Result<Setup> {
-    let made = Setup::new(&node.exec, &Arguments::parse(node.ros_args())?);
-    made.with_context(|| format!("node {}", node.name))
 }
 
 fn plan_file(path: &Path) -> Result<Plan> {

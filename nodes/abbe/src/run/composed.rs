@@ -14,10 +14,9 @@ use live_view_node::Feed;
 use metrology::epoch;
 use metrology::sample::PlanState;
 use metrology::stamp::{Host, Span, Stamp};
-use node_runtime::arguments::Arguments;
 use node_runtime::harness::Published;
 use node_runtime::tap::Selection;
-use node_runtime::{Diagnostic, Harness, Interruption, Level, Node, Setup, complain};
+use node_runtime::{Diagnostic, Harness, Interruption, Level, Node, complain};
 use recorder::{
     CALL_RECORD, ChannelId, MessageStamp, RecordedCall, Recorder, RecorderSink, RunNode,
 };
@@ -170,7 +169,7 @@ fn build(scenario: &Scenario, truth: &Arc<Truth>) -> Result<Vec<Box<dyn Node>>> 
 }
 
 fn build_node(launched: &LaunchNode, truth: &Arc<Truth>) -> Result<Box<dyn Node>> {
-    let setup = Setup::new(&launched.exec, &Arguments::parse(launched.ros_args())?)?;
+    let setup = launched.setup()?;
     if launched.exec == "fake_cnc" {
         return fake_cnc_node::witnessed(&setup, Some(truth.witness()));
     }

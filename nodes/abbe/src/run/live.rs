@@ -9,7 +9,6 @@ use anyhow::{Context, Result, bail};
 use live_view_node::{Feed, Receiver};
 use metrology::sample::PlanState;
 use metrology::stamp::{Host, Stamp};
-use node_runtime::arguments::Arguments;
 use node_runtime::complain;
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
@@ -142,10 +141,6 @@ impl Prepared {
 }
 
 fn prepare(scenario: &Scenario, separate: bool) -> Result<Prepared> {
-    let setup = |launched: &LaunchNode| -> Result<Setup> {
-        let arguments = Arguments::parse(launched.ros_args())?;
-        Ok(Setup::new(&launched.exec, &arguments)?)
-    };
     let known = |launched: &LaunchNode| match node::builder(&launched.exec) {
         Some(build) => Ok(build),
         None => bail!(
@@ -159,7 +154,7 @@ fn prepare(scenario: &Scenario, separate: bool) -> Result<Prepared> {
     for launched in &scenario.nodes {
         let context = || format!("node {}", launched.name);
         let build = known(launched).with_context(context)?;
-        let setup = setup(launched).with_context(context)?;
+        let setup = launched.setup()?;
         if separate {
             let parameters = setup.resolved_by(build).with_context(context)?;
             given.insert(

@@ -6,9 +6,8 @@ use anyhow::{Context, Result};
 use clap::Args;
 use live_view::{DEFAULT_ADDRESS, LiveViewConfig};
 use live_view_node::{Feed, Slot, View, ViewOptions, limits_of};
-use node_runtime::arguments::Arguments;
 use node_runtime::harness::Published;
-use node_runtime::{Harness, HostTime, Setup, complain, text_file};
+use node_runtime::{Harness, HostTime, complain, text_file};
 
 use crate::scenario::Scenario;
 
@@ -45,9 +44,7 @@ impl ServeOptions {
         }
         for launched in &scenario.nodes {
             if launched.exec == "axis_compensation" {
-                let arguments = Arguments::parse(launched.ros_args())?;
-                let setup = Setup::new(&launched.exec, &arguments)?;
-                options.limits_um = limits_of(&setup)?;
+                options.limits_um = limits_of(&launched.setup()?)?;
             }
         }
         let view = View::open(&config, options).context("--serve")?;

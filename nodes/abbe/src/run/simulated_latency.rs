@@ -12,8 +12,6 @@
 use std::path::Path;
 
 use metrology::text::Comments;
-use node_runtime::Setup;
-use node_runtime::arguments::Arguments;
 use node_runtime::text_file;
 use reports::evidence::Evidence;
 
@@ -65,7 +63,7 @@ fn delay_of(node: &LaunchNode) -> Option<Delay> {
     if node.exec != BRIDGE {
         return None;
     }
-    let setup = Setup::new(&node.exec, &Arguments::parse(node.ros_args()).ok()?).ok()?;
+    let setup = node.setup().ok()?;
     let ini_path = setup.file_path(INI_PARAMETER).ok()?;
     let ini = text(&ini_path)?;
     let folder = ini_path.parent().unwrap_or(Path::new(""));

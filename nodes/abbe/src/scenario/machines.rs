@@ -9,8 +9,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use machine::MachineFile;
 use metrology::number::quantity;
-use node_runtime::Setup;
-use node_runtime::arguments::Arguments;
 use node_runtime::text_file;
 use serde_json::Value;
 
@@ -74,7 +72,7 @@ fn namespace(node: &LaunchNode) -> &str {
 }
 
 fn reader(node: &LaunchNode) -> Option<Reader> {
-    let setup = Setup::new(&node.exec, &Arguments::parse(node.ros_args()).ok()?).ok()?;
+    let setup = node.setup().ok()?;
     let (path, text) = setup.file_text("machine_file").ok()?;
     // A simulator that has effects the machine's own file does not list.
     let own: &[&str] = match node.exec.as_str() {
@@ -213,6 +211,7 @@ mod tests {
                 parameter_files: vec![path],
                 parameters: vec![],
                 ends_within: None,
+                place: String::new(),
             });
         }
 
@@ -234,6 +233,7 @@ mod tests {
             parameter_files: vec![],
             parameters: vec![],
             ends_within: None,
+            place: String::new(),
         };
         let two = |exec, spaces: [&str; 2]| {
             let nodes = [node(exec, "a", spaces[0]), node(exec, "b", spaces[1])];

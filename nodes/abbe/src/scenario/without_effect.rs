@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use node_runtime::Setup;
-use node_runtime::arguments::Arguments;
 use node_runtime::setup::is_for;
 use node_runtime::text_file::{self, Comments};
 
@@ -20,7 +19,7 @@ impl Scenario {
     pub fn without_effect(&self) -> Result<Vec<String>> {
         let mut setups = vec![];
         for node in &self.nodes {
-            setups.push(Setup::new(&node.exec, &Arguments::parse(node.ros_args())?)?);
+            setups.push(node.setup()?);
         }
         let names: Vec<String> = setups
             .iter()

@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use node_runtime::arguments::Arguments;
-use node_runtime::{Setup, complaint};
+use node_runtime::complaint;
 
 use super::Findings;
 use super::programs;
@@ -189,6 +188,7 @@ fn planned(folder: &Path, files: &[File], launched: &[LaunchNode]) -> Option<Lau
         parameter_files: vec![],
         parameters: vec![file("machine_file", &machine), file("plan_file", &plan)],
         ends_within: None,
+        place: String::new(),
     })
 }
 
@@ -201,7 +201,7 @@ fn built(node: &LaunchNode) -> Result<()> {
             node::names()
         )
     })?;
-    let setup = Setup::new(&node.exec, &Arguments::parse(node.ros_args())?)?;
+    let setup = node.setup()?;
     if !OPENING.contains(&node.exec.as_str()) {
         return build(&setup).map(drop);
     }
@@ -259,6 +259,7 @@ mod tests {
             parameter_files: vec![home.path().join("b/../a/probe.yaml")],
             parameters: vec![],
             ends_within: None,
+            place: String::new(),
         };
         assert!(is_read(std::slice::from_ref(&node), &a));
         assert!(!is_read(&[node], &b));

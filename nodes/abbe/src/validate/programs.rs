@@ -10,8 +10,6 @@ use fake_cnc::config::Settings;
 use fake_cnc::rs274::{self, Envelope};
 use machine::MachineFile;
 use metrology::PerAxis;
-use node_runtime::Setup;
-use node_runtime::arguments::Arguments;
 use sequencer_node::{read_plan, read_programs};
 
 use super::Findings;
@@ -40,13 +38,9 @@ pub fn check(launched: &[LaunchNode], findings: &mut Findings) {
     }
 }
 
-fn setup_of(node: &LaunchNode) -> Result<Setup> {
-    Ok(Setup::new(&node.exec, &Arguments::parse(node.ros_args())?)?)
-}
-
 /// Paths and texts of the programs of a sequencer's plan.
 fn programs_of(sequencer: &LaunchNode) -> Result<Vec<(PathBuf, String)>> {
-    let setup = setup_of(sequencer)?;
+    let setup = sequencer.setup()?;
     let config: sequencer::Config = setup.config()?;
     if config.plan_file.is_empty() {
         return Ok(vec![]);
@@ -68,7 +62,7 @@ struct Control {
 
 impl Control {
     fn of(control: &LaunchNode) -> Result<Self> {
-        let setup = setup_of(control)?;
+        let setup = control.setup()?;
         let config: fake_cnc::Config = setup.config()?;
         let (path, text) = setup.file_text("machine_file")?;
         let machine = MachineFile::parse(&text, &path.display().to_string())?;

@@ -207,7 +207,7 @@ fn launched(path: &Path) -> Result<()> {
                 node::names()
             )));
         }
-        Setup::new(&node.exec, &Arguments::parse(node.ros_args())?)?;
+        node.setup()?;
     }
     Ok(())
 }
