@@ -24,12 +24,14 @@ use crate::names::{self, NodeNames};
 use crate::network::{Guid, Remote, Role};
 use absent::Absent;
 use first_sample::FirstSamples;
+use meetings::Meetings;
 use peers::{Peers, Way};
 use reply::LongReplies;
 
 mod absent;
 mod endpoint;
 mod first_sample;
+mod meetings;
 mod peers;
 mod policies;
 mod ports;
@@ -116,14 +118,18 @@ struct ByHand {
 }
 
 impl ByHand {
-    fn of(participant: &DomainParticipant) -> std::io::Result<Self> {
+    /// And who has met whom, which the first samples need.
+    fn of(participant: &DomainParticipant) -> std::io::Result<(Self, Meetings)> {
         let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
         socket.set_nonblocking(true)?;
         let socket = Arc::new(socket);
-        Ok(Self {
-            first_samples: FirstSamples::of(participant, Arc::clone(&socket)),
+        let (first_samples, ask) = FirstSamples::of(participant, Arc::clone(&socket));
+        let meetings = Meetings::of(participant, ask);
+        let by_hand = Self {
+            first_samples,
             socket,
-        })
+        };
+        Ok((by_hand, meetings))
     }
 }
 
@@ -171,6 +177,7 @@ pub(crate) struct Participant {
     neighbours: Mutex<BTreeMap<[u8; 12], String>>,
     /// What is sent past the library; nothing where packets are encrypted.
     by_hand: Option<ByHand>,
+    meetings: Meetings,
     _others: Others,
     participant: DomainParticipant,
 }
@@ -238,13 +245,15 @@ impl Participant {
         let graph_reader =
             subscriber.create_simple_datareader_no_key(&topic, Some(policies::graph_reader()))?;
         let entities = Mutex::new(NodeEntitiesInfo::new(node.clone()));
-        let by_hand = if is_encrypted {
-            None
+        let (by_hand, meetings) = if is_encrypted {
+            (None, Meetings::of(&participant, |_, _| {}))
         } else {
-            Some(ByHand::of(&participant)?)
+            let (by_hand, meetings) = ByHand::of(&participant)?;
+            (Some(by_hand), meetings)
         };
         Ok(Self {
             by_hand,
+            meetings,
             _others: others,
             participant,
             publisher,
@@ -255,6 +264,11 @@ impl Participant {
             entities,
             neighbours: Mutex::default(),
         })
+    }
+
+    /// Whether a writer of ours sends to a reader of the participant that an endpoint is of.
+    pub fn reaches(&self, writer: &Writer, other: &Guid) -> bool {
+        self.meetings.reaches(writer.guid(), other)
     }
 
     fn topic(&self, name: &str, type_name: &str, qos: Qos) -> anyhow::Result<rustdds::Topic> {

@@ -207,10 +207,14 @@ impl Participant {
         })
     }
 
-    /// Whether an answer reaches only a client whose reader of replies has been seen. Zenoh's answers go
-    /// back the way of their question.
-    pub fn must_see_clients(&self) -> bool {
-        matches!(self, Self::Dds(_))
+    /// Whether a writer's answers reach the participant that an endpoint is of. Zenoh's go back the way of their
+    /// question.
+    pub fn reaches(&self, writer: &Writer, other: &Guid) -> bool {
+        match (self, writer) {
+            (Self::Dds(participant), Writer::Dds(writer)) => participant.reaches(writer, other),
+            #[cfg(feature = "zenoh")]
+            _ => true,
+        }
     }
 
     /// What is not heard once the clock was set back, until it shows again what it showed before.

@@ -12,9 +12,7 @@ use std::net::{SocketAddr, UdpSocket};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use futures::StreamExt;
-use rustdds::{DomainParticipant, DomainParticipantStatusEvent, GUID, StatusEvented};
-use tokio::task::JoinHandle;
+use rustdds::{DomainParticipant, GUID};
 
 use super::rtps::asking_for_first;
 use crate::network::Guid;
@@ -27,40 +25,31 @@ const REQUESTS: [(u32, Duration); 2] = [
     (2, Duration::from_millis(20)),
 ];
 
-/// Asks for them while it is there.
+/// Our reliable readers, whose new writers are asked.
 pub(super) struct FirstSamples {
     readers: Arc<Mutex<BTreeSet<Guid>>>,
-    asking: JoinHandle<()>,
 }
 
 impl FirstSamples {
-    /// Must be made inside a runtime.
-    pub fn of(participant: &DomainParticipant, socket: Arc<UdpSocket>) -> Self {
+    /// And what is to be called with each reader of ours that has met a writer, inside a runtime.
+    pub fn of(
+        participant: &DomainParticipant,
+        socket: Arc<UdpSocket>,
+    ) -> (Self, impl Fn(Guid, GUID) + Send + use<>) {
         let readers = Arc::new(Mutex::new(BTreeSet::new()));
         let ours = Arc::clone(&readers);
         let participant = participant.clone();
-        let asking = tokio::spawn(async move {
-            let listener = participant.status_listener();
-            let mut events = listener.as_async_status_stream();
-            while let Some(event) = events.next().await {
-                let DomainParticipantStatusEvent::RemoteWriterMatched {
-                    local_reader,
-                    remote_writer,
-                } = event
-                else {
-                    continue;
-                };
-                let (reader, writer) = (local_reader.to_bytes(), remote_writer.to_bytes());
-                let is_ours = |of: &BTreeSet<Guid>| of.contains(&reader);
-                if writer[..2] == FAST_VENDOR
-                    && is_ours(&ours.lock().unwrap_or_else(PoisonError::into_inner))
-                {
-                    let addresses = addresses(&participant, remote_writer);
-                    tokio::spawn(ask(Arc::clone(&socket), reader, writer, addresses));
-                }
+        let met = move |reader: Guid, remote: GUID| {
+            let writer = remote.to_bytes();
+            let is_ours = |of: &BTreeSet<Guid>| of.contains(&reader);
+            if writer[..2] == FAST_VENDOR
+                && is_ours(&ours.lock().unwrap_or_else(PoisonError::into_inner))
+            {
+                let addresses = addresses(&participant, remote);
+                tokio::spawn(ask(Arc::clone(&socket), reader, writer, addresses));
             }
-        });
-        Self { readers, asking }
+        };
+        (Self { readers }, met)
     }
 
     /// Makes a reliable reader, and takes care of it.
@@ -74,12 +63,6 @@ impl FirstSamples {
         let reader = make()?;
         readers.insert(guid(&reader));
         Ok(reader)
-    }
-}
-
-impl Drop for FirstSamples {
-    fn drop(&mut self) {
-        self.asking.abort();
     }
 }
 
