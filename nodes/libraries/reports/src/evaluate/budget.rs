@@ -79,6 +79,8 @@ pub fn unstate_named(figures: &mut Value, names: &[&str]) {
 const REFERENCE_DEGC: f64 = 20.0;
 /// Farthest from it that a machine is measured, K.
 const FARTHEST_K: f64 = 100.0;
+/// The same of a thermometer during a test, K: further off it reads another unit, or something else than the body.
+const FARTHEST_READ_K: f64 = 30.0;
 /// The largest that can be stated, by the unit that a key ends with: the longest first. Beyond it the unit is mistaken.
 const GREATEST: [(&str, f64); 8] = [
     (".length_mm", 1000.0),
@@ -320,12 +322,12 @@ impl Body {
 
 /// Refuses a thermometer that reads what no budget may state.
 fn check_range(name: &str, readings: &Readings) -> Result<(), String> {
-    let [low, high] = [-FARTHEST_K, FARTHEST_K].map(|off_k| REFERENCE_DEGC + off_k);
+    let [low, high] = [-FARTHEST_READ_K, FARTHEST_READ_K].map(|off_k| REFERENCE_DEGC + off_k);
     let both = [readings.least_degc, readings.greatest_degc];
     let wrong = both.into_iter().find(|degc| !(low..=high).contains(degc));
     wrong.map_or(Ok(()), |degc| {
         Err(format!(
-            "names the thermometer {name}, and {}{name} read {} °C during this test: must be from {low} to {high} °C; is it in K or °F?",
+            "names the thermometer {name}, and {}{name} read {} °C during this test: must be from {low} to {high} °C; is it in K or °F? Where the body was as warm, state temperature_deviation_k instead",
             topics::TEMPERATURE.base,
             number(degc),
         ))
