@@ -16,6 +16,8 @@ pub mod beside;
 pub mod clock_parts;
 #[path = "../../nodes/abbe/src/import/dates.rs"]
 pub mod dates;
+#[path = "../../nodes/abbe/src/import/deviation_names.rs"]
+pub mod deviation_names;
 #[path = "../../nodes/abbe/src/import/laser_conditions.rs"]
 pub mod laser_conditions;
 #[path = "../../nodes/abbe/src/import/limits.rs"]

@@ -24,6 +24,7 @@ mod beside;
 mod book;
 mod clock_parts;
 mod dates;
+mod deviation_names;
 mod file;
 mod hidden;
 mod instrument;

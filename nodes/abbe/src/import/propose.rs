@@ -294,6 +294,7 @@ impl<'t> Text<'t> {
         match (found.first(Role::Deviation), found.first(Role::Measured)) {
             (Some(read), _) => {
                 sign::check(found, read)?;
+                across::check(found, read)?;
                 self.read(key("deviation_um", "deviation_arcsec"), read);
                 self.unit(read, deviation, likely_deviation(&[read], deviation))?;
             }
@@ -584,6 +585,7 @@ pub fn machine_for(map: &Map) -> String {
     text
 }
 
+mod across;
 #[cfg(test)]
 mod cells;
 mod epochs;

@@ -105,8 +105,17 @@ const PLAIN: &[&str] = &[
 fn is_of(role: Role, word: &str) -> bool {
     let own = ROLE_WORDS.iter().find(|(other, ..)| *other == role);
     own.is_some_and(|(_, begins, whole)| {
-        whole.contains(&word) || begins.iter().any(|begin| word.starts_with(begin))
+        whole.contains(&word)
+            || begins.iter().any(|begin| word.starts_with(begin))
+            || role == Role::Deviation && is_joined_deviation(word)
     })
+}
+
+/// `Positionsabweichung`, `Schleppfehler`.
+fn is_joined_deviation(word: &str) -> bool {
+    ["abweichung", "abweichungen", "fehler"]
+        .iter()
+        .any(|end| word.ends_with(end))
 }
 
 /// Whether words of a name are those of a statistic, a limit or what was worked out of readings.

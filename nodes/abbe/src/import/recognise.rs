@@ -4,6 +4,7 @@ use anyhow::Result;
 use metrology::Axis;
 
 use super::beside;
+use super::deviation_names;
 use super::map::{Direction, Plane};
 use super::odd::is_missing;
 use super::pass_names;
@@ -138,12 +139,13 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
             .map_or(Stated::Nothing, |cell| stated::of_cell(cell));
         known(name, unit, &cells, decimal)
     });
+    let columns = deviation_names::plain_alone(columns.collect());
     let above = lines[..at].iter().map(|(_, cells)| cells.join(" "));
     Some(Recognised {
         separator: sheet.separator.unwrap_or(','),
         decimal,
         head_line: *head_line,
-        columns: columns.collect(),
+        columns,
         n_rows: lines.len() - at - 1,
         above: above.collect::<Vec<_>>().join(" "),
         comments: String::new(),

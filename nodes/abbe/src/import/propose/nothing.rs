@@ -1,16 +1,17 @@
 //! Why nothing is read of a table.
 
 use super::super::recognise::Recognised;
-use super::super::{pass_names, unread};
+use super::super::{deviation_names, pass_names, unread};
 use super::{names, sign};
 
 /// The cells that stand in the way; without any, what is unsure about the names of columns.
 pub fn in_words(found: &Recognised) -> String {
     unread::in_words(found).unwrap_or_else(|| {
         format!(
-            "{}{}columns {}: neither targets with deviations, nor a time with a displacement, nor angles with radial deviations: write a map (docs/reference/scenario.md#import-map)",
+            "{}{}{}columns {}: neither targets with deviations, nor a time with a displacement, nor angles with radial deviations: write a map (docs/reference/scenario.md#import-map)",
             pass_names::unsure(found),
             sign::unsure(found),
+            deviation_names::unsure(found),
             names(found).join(", ")
         )
     })

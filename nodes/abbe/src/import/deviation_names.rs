@@ -1,0 +1,363 @@
+//! Names of columns that hold the deviations of a positioning test, word by word.
+//!
+//! A table of a laser has columns beside the readings whose names hold the same word: `Pitch error`, `Standard deviation`,
+//! `Abs. error`, `Fehlergrenze`, `error*10`. None of a name's words may therefore be unknown here. Any other column is named
+//! with the word that is in doubt, and read where a map names it.
+
+use super::pass_names::axis_of;
+use super::recognise::{Known, Recognised, Role, parts};
+use super::units::Unit;
+use super::vocabulary::words;
+
+/// Words for a deviation.
+const DEVIATION: &[&str] = &[
+    "dev",
+    "devs",
+    "devn",
+    "deviation",
+    "deviations",
+    "err",
+    "errs",
+    "error",
+    "errors",
+    "abw",
+    "abweichung",
+    "abweichungen",
+    "fehler",
+    "diff",
+    "diffs",
+    "difference",
+    "differences",
+    "differenz",
+    "delta",
+];
+/// What one of them is joined to in one word.
+const JOINED: &[&str] = &[
+    "positions",
+    "position",
+    "positionier",
+    "positionierungs",
+    "gesamt",
+    "lage",
+    "laser",
+    "achs",
+    "achsen",
+    "x",
+    "y",
+    "z",
+];
+/// Other words of such a name: they name the instrument, the state of the machine, or the readings as such.
+const HARMLESS: &[&str] = &[
+    // Grammar, numbers of repetitions.
+    "of",
+    "the",
+    "in",
+    "at",
+    "on",
+    "off",
+    "and",
+    "from",
+    "for",
+    "to",
+    "und",
+    "der",
+    "des",
+    "die",
+    "bei",
+    "axis",
+    "achse",
+    "axe",
+    "value",
+    "values",
+    "wert",
+    "werte",
+    "data",
+    "point",
+    "punkt",
+    "no",
+    "nr",
+    "n",
+    "i",
+    "j",
+    "ij",
+    "run",
+    "cycle",
+    "test",
+    "series",
+    "lauf",
+    "zyklus",
+    "messung",
+    "reihe",
+    "column",
+    // The quantity itself.
+    "position",
+    "positional",
+    "positioning",
+    "pos",
+    "posn",
+    "linear",
+    "axial",
+    "rotary",
+    "angular",
+    "angle",
+    "length",
+    "displacement",
+    "travel",
+    "target",
+    "nominal",
+    "commanded",
+    "command",
+    "soll",
+    "sollwert",
+    "ist",
+    "istwert",
+    "measured",
+    "measurement",
+    "meas",
+    "actual",
+    "indicated",
+    "observed",
+    "recorded",
+    "read",
+    "reading",
+    "readings",
+    "gemessen",
+    "gemessene",
+    "total",
+    "overall",
+    "gesamt",
+    "signed",
+    "minus",
+    "radial",
+    // How it was come by.
+    "raw",
+    "roh",
+    "final",
+    "original",
+    "corrected",
+    "uncorrected",
+    "korrigiert",
+    "korrigierte",
+    "compensated",
+    "uncompensated",
+    "kompensiert",
+    "unkompensiert",
+    "with",
+    "without",
+    "before",
+    "after",
+    "under",
+    "mit",
+    "ohne",
+    "vor",
+    "nach",
+    "compensation",
+    "correction",
+    "kompensation",
+    "korrektur",
+    "active",
+    "inactive",
+    "aktiv",
+    "ein",
+    "aus",
+    "cold",
+    "warm",
+    "hot",
+    "kalt",
+    // Instruments and machines.
+    "laser",
+    "interferometer",
+    "lasertracker",
+    "tracker",
+    "scale",
+    "encoder",
+    "probe",
+    "sensor",
+    "gauge",
+    "ballbar",
+    "renishaw",
+    "xl80",
+    "xl",
+    "ml10",
+    "xm60",
+    "agilent",
+    "keysight",
+    "hp",
+    "zygo",
+    "sios",
+    "heidenhain",
+    "lasertex",
+    "api",
+    "machine",
+    "maschine",
+    "exx",
+    "eyy",
+    "ezz",
+    "eaa",
+    "ebb",
+    "ecc",
+];
+/// Signs by which a name says that its numbers were multiplied, divided or turned.
+const MARKS: &[char] = &['*', '×', '·', '²', '^', '=', '%'];
+
+/// The word, or the sign, by which a column may hold something else than readings; none where each is known.
+pub fn doubt(name: &str) -> Option<String> {
+    let first = name.trim_start().chars().next();
+    if let Some(minus) = first.filter(|first| ['-', '\u{2212}', '\u{2013}', '±'].contains(first)) {
+        return Some(minus.to_string());
+    }
+    if let Some(mark) = name.chars().find(|letter| MARKS.contains(letter)) {
+        return Some(mark.to_string());
+    }
+    let digit_beside = |slash: usize| {
+        let is_digit = |letter: Option<char>| letter.is_some_and(|letter| letter.is_ascii_digit());
+        is_digit(name[..slash].trim_end().chars().next_back())
+            || is_digit(name[slash + 1..].trim_start().chars().next())
+    };
+    let (mut all, inner) = parts(name);
+    let is_unit = |text: &String| Unit::of_word(text).is_some();
+    let note = inner.filter(|inner| !is_unit(inner));
+    all.extend(note.iter().flat_map(|note| words(note)));
+    if name
+        .match_indices('/')
+        .any(|(slash, _)| digit_beside(slash))
+    {
+        return Some("/".to_owned());
+    }
+    all.into_iter().find(|word| !is_known(word))
+}
+
+fn is_known(word: &str) -> bool {
+    let bare = word.trim_end_matches(|letter: char| letter.is_ascii_digit());
+    let is_number = bare.is_empty() && !is_factor(word);
+    let joined = || {
+        let mut begins = JOINED.iter().filter_map(|begin| bare.strip_prefix(begin));
+        begins.any(|rest| DEVIATION.contains(&rest))
+    };
+    // `deviationX`, `error_um` in one word.
+    let with_end = || {
+        let mut ends = DEVIATION
+            .iter()
+            .filter_map(|begin| bare.strip_prefix(begin));
+        ends.any(|end| axis_of(end).is_some() || Unit::of_word(end).is_some())
+    };
+    is_number
+        || DEVIATION.contains(&bare)
+        || HARMLESS.contains(&word)
+        || HARMLESS.contains(&bare)
+        || (axis_of(word).is_some() && !is_times(word))
+        || Unit::of_word(word).is_some()
+        || joined()
+        || with_end()
+}
+
+/// Whether a number is one that numbers are multiplied by.
+fn is_factor(word: &str) -> bool {
+    matches!(word, "10" | "100" | "1000" | "10000")
+}
+
+/// `x10`: times ten, and no axis of that number.
+fn is_times(word: &str) -> bool {
+    word.strip_prefix('x').is_some_and(is_factor)
+}
+
+/// The columns of a table, where beside targets or angles only those hold deviations whose names say nothing else.
+pub fn plain_alone(mut columns: Vec<Known>) -> Vec<Known> {
+    let is_place = |column: &Known| matches!(column.role, Some(Role::Target | Role::Angle));
+    if columns.iter().any(is_place) {
+        let deviations = columns.iter_mut();
+        for column in deviations.filter(|column| column.role == Some(Role::Deviation)) {
+            if doubt(&column.name).is_some() {
+                column.role = None;
+            }
+        }
+    }
+    columns
+}
+
+/// A sentence on columns that are no deviations by a word of their names; empty without any.
+pub fn unsure(found: &Recognised) -> String {
+    let columns = found.columns.iter().filter(|column| column.role.is_none());
+    let in_doubt = columns.filter(|column| !column.numbers.is_empty() && is_one(&column.name));
+    let named: Vec<String> = in_doubt
+        .filter_map(|column| {
+            let word = doubt(&column.name)?;
+            Some(format!("\"{}\" ({word})", column.name))
+        })
+        .collect();
+    if named.is_empty() {
+        return String::new();
+    }
+    format!(
+        "column {}: may hold something else than deviations by what stands in brackets here: where it has the measured positions \
+         less the targets, name it as deviation_um in a map; ",
+        named.join(", ")
+    )
+}
+
+/// Whether a name has a word for a deviation, with whatever else.
+fn is_one(name: &str) -> bool {
+    const BEGINS: [&str; 6] = ["dev", "err", "abw", "fehler", "diff", "delta"];
+    const ENDS: [&str; 4] = ["abweichung", "abweichungen", "fehler", "fehlers"];
+    words(name).iter().any(|word| {
+        BEGINS.iter().any(|begin| word.starts_with(begin))
+            || ENDS.iter().any(|end| word.ends_with(end))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_of_which_each_word_is_known_is_that_of_readings() {
+        for name in [
+            "deviation_um",
+            "Deviation [µm]",
+            "X deviation (um)",
+            "DeviationX",
+            "Err",
+            "error um",
+            "Error 1 (µm)",
+            "Abweichung",
+            "Positionsabweichung [µm]",
+            "Positionierfehler um",
+            "Gesamtabweichung",
+            "raw error um",
+            "final error um",
+            "error after compensation",
+            "deviation (compensation on)",
+            "uncompensated error",
+            "Laser deviation um",
+            "Renishaw XL80 error um",
+            "diff",
+            "delta_um",
+            "EXX deviation um",
+            "error in um",
+            "deviation [1] um",
+            "Fehler ohne Korrektur",
+            "measured - target difference",
+        ] {
+            assert_eq!(doubt(name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_statistic_a_limit_another_error_or_a_factor_is_in_doubt() {
+        let names = [
+            "Standard deviation;St.dev.;Abs. deviation;Absolute error;Peak error;error budget;error bar",
+            "expanded error;Fehlergrenze;Abweichungsgrenze;zul. Abweichung;mittlerer Fehler;mittl. Abweichung",
+            "Residual error;detrended error;predicted error;model error;Pitch error um;Abbe error",
+            "cosine error;dead path error;humidity error;closure error;form error;cyclic error;drift error",
+            "backlash error;lost motion error;following error;contouring error;servo error;Schleppfehler",
+            "Fehlernummer;error flag;error code;deviation sum;cumulative error;incremental error",
+            "diff to previous;-error um;\u{2212}error um;neg. error;inverted error;1/error;error (um)/2",
+            "half error;error*10;error x10;deviation x 1000 mm;EYX error um;Lateral deviation um",
+            "vertical deviation um;horizontal deviation um;normal deviation um;cross deviation um",
+            "median error;worst error;allowed error",
+        ];
+        for name in names.iter().flat_map(|names| names.split(';')) {
+            assert!(doubt(name).is_some(), "{name}");
+        }
+    }
+}
