@@ -20,6 +20,8 @@ pub mod dates;
 pub mod deviation_names;
 #[path = "../../nodes/abbe/src/import/laser_conditions.rs"]
 pub mod laser_conditions;
+#[path = "../../nodes/abbe/src/import/laser_passes.rs"]
+pub mod laser_passes;
 #[path = "../../nodes/abbe/src/import/limits.rs"]
 pub mod limits;
 #[path = "../../nodes/abbe/src/import/listed.rs"]

@@ -29,6 +29,7 @@ mod file;
 mod hidden;
 mod instrument;
 mod laser_conditions;
+mod laser_passes;
 pub(crate) mod limits;
 mod listed;
 pub(crate) mod map;

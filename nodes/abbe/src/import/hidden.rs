@@ -63,7 +63,17 @@ impl Hidden {
 
 fn is_hidden(rest: &[u8]) -> bool {
     let mut all = values(rest, b"hidden").into_iter();
+    let mut sizes = [&b"ht"[..], b"width"].into_iter();
     all.any(|value| value == b"1" || value.eq_ignore_ascii_case(b"true"))
+        || sizes.any(|size| values(rest, size).iter().any(|value| is_zero(value)))
+}
+
+/// Whether a height or width is none.
+fn is_zero(value: &[u8]) -> bool {
+    let size = std::str::from_utf8(value)
+        .ok()
+        .and_then(|text| text.parse::<f64>().ok());
+    size.is_some_and(|size| size <= 0.0)
 }
 
 /// A whole number of an attribute.
@@ -131,6 +141,8 @@ mod tests {
             ("col min='1' max='3' hidden='1'", 3),
             ("col min='4' max='16384' hidden='1'", 0),
             ("col min='1' max='3'", 0),
+            ("col min='1' max='1' width='0' customWidth='1'", 1),
+            ("col min='1' max='1' width='8.5'", 0),
             ("col min='1' max='3' hidden='0'", 0),
         ] {
             let cells = ["row", "c r='A1'", "v", "c r='B1'", "is", "c", "v"];

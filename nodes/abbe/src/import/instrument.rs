@@ -67,9 +67,28 @@ fn is_ballbar(text: &str) -> bool {
 /// The form that a file is of; none of those that are known.
 pub fn of(bytes: &[u8]) -> Option<&'static Instrument> {
     let begin = bytes.get(..BYTES_LOOKED_AT).unwrap_or(bytes);
-    let text = String::from_utf8_lossy(begin);
+    let text = text_of(begin);
+    INSTRUMENTS.iter().find(|form| (form.is_one)(&text))
+}
+
+/// The text of a file: names of machines may be in any encoding, and numbers are ASCII. Of UTF-16 with a byte order mark the
+/// letters, and lines that end as on any system.
+fn text_of(bytes: &[u8]) -> String {
+    let of_pairs = |order: fn([u8; 2]) -> u16| {
+        let pairs = bytes[2..].as_chunks().0.iter().copied().map(order);
+        String::from_utf16_lossy(&pairs.collect::<Vec<u16>>())
+    };
+    let text = match bytes {
+        [0xff, 0xfe, ..] => of_pairs(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => of_pairs(u16::from_be_bytes),
+        _ => String::from_utf8_lossy(bytes).into_owned(),
+    };
     let text = text.trim_start_matches('\u{feff}');
-    INSTRUMENTS.iter().find(|form| (form.is_one)(text))
+    if text.contains('\n') {
+        text.to_owned()
+    } else {
+        text.replace('\r', "\n")
+    }
 }
 
 impl Instrument {
@@ -82,9 +101,7 @@ impl Instrument {
             Content::Table(read) => read,
             Content::Refused(why) => bail!("{}: {why}", self.name),
         };
-        // Names of machines may be in any encoding, and numbers are ASCII.
-        let text = String::from_utf8_lossy(bytes);
-        let mut cells = read(text.trim_start_matches('\u{feff}')).with_context(|| self.name)?;
+        let mut cells = read(&text_of(bytes)).with_context(|| self.name)?;
         if decimal != '.' {
             let numbers = cells
                 .sheet

@@ -91,9 +91,6 @@ pub struct Recognised {
 const LOOKED_AT: usize = 2000;
 /// Lines of a text from which its separator and decimals are recognised.
 const BEGIN: usize = 20_000;
-/// Rows among which a line of units may stand below the names.
-const UNIT_ROWS: usize = 2;
-
 /// Looks at the cells of a file; `None`: no line of names has rows of numbers below it.
 pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
     let is_number = |cell: &String| number_of(cell, decimal).is_some() || is_instant(cell);
@@ -103,14 +100,7 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
         words.filter(|cell| !is_number(cell)).count()
     };
     let lines = &sheet.lines;
-    let at = (0..lines.len()).find(|k| {
-        let cells = &lines[*k].1;
-        let mut below = lines[k + 1..].iter().take(UNIT_ROWS);
-        n_words(cells) >= 2
-            && n_words(cells) > n_numbers(cells)
-            && below.any(|(_, cells)| n_numbers(cells) >= 2)
-    });
-    let at = at.or_else(|| unread::head(lines))?;
+    let at = unread::names_at(lines, n_words, n_numbers).or_else(|| unread::head(lines))?;
     let (head_line, head) = &lines[at];
     let has_numbers = lines[at + 1..]
         .iter()
@@ -547,6 +537,9 @@ mod tests {
             .unwrap()
             .expect("a table");
         assert_eq!(found.head_line, 4, "below two comments and an empty line");
+        let found =
+            of_text("Units;inch\nrun;direction;target;deviation\n1;up;0;0.5\n1;up;10;0.7\n");
+        assert_eq!(found.unwrap().expect("a table").head_line, 2);
         assert_eq!(
             of_text("no numbers\nat all\n")
                 .unwrap()

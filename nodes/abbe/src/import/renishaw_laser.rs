@@ -36,8 +36,21 @@ use anyhow::{Context, Result, bail};
 use metrology::Axis;
 
 use super::laser_conditions;
+use super::laser_passes::{self, Passes, Reading, is_empty};
 use super::sheet::{Cells, MOST_CELLS, Sheet};
 
+/// Words for the owner of a file that is of another measurement.
+const OTHER_TESTS: [&str; 9] = [
+    "straight",
+    "velocity",
+    "squareness",
+    "pitch",
+    "yaw",
+    "roll",
+    "flatness",
+    "parallel",
+    "dynamic",
+];
 /// Most targets of a file.
 const MOST_TARGETS: usize = 100_000;
 /// Columns of the table that is made.
@@ -66,6 +79,12 @@ pub fn cells(text: &str) -> Result<Cells> {
     let kind = file.kind()?;
     let mut passes = file.passes()?;
     let mut remarks = file.one_way(&mut passes);
+    let run_count = file.count("RUNS", "run-count")?.map(|(_, n)| n);
+    remarks.extend(laser_passes::leave_out(&mut passes, run_count));
+    if let Kind::Linear = kind {
+        remarks.extend(laser_passes::doubt_unit(&passes));
+    }
+    remarks.extend(file.doubt_axis());
     let recorded = |key: &str| file.value("ENVIRONMENT", key);
     remarks.extend(laser_conditions::in_words(recorded));
     let axis = file.axis().map_or("", Axis::letter);
@@ -76,7 +95,7 @@ pub fn cells(text: &str) -> Result<Cells> {
     let head = ["Run", "Direction", units[0], units[1], "Axis"];
     let mut lines = vec![(file.data_line, head.map(str::to_owned).to_vec())];
     for (number, pass) in &passes {
-        let way = way_of(*number, pass)?;
+        let way = laser_passes::way_of(*number, pass)?;
         lines.extend(pass.iter().map(|one| {
             let [target, deviation] = [one.target, one.deviation].map(|value| value.to_string());
             let cells = [
@@ -116,17 +135,6 @@ enum Kind {
     Linear,
     Rotary,
 }
-
-/// One reading.
-#[derive(Clone, Copy)]
-struct Reading {
-    line: u64,
-    target: f64,
-    deviation: f64,
-}
-
-/// Passes by their numbers, each in the order of its lines.
-type Passes = BTreeMap<u32, Vec<Reading>>;
 
 /// What a file holds.
 #[derive(Default)]
@@ -280,7 +288,10 @@ impl File {
     fn kind(&self) -> Result<Kind> {
         let named = self.value("HEADER", "file type").to_lowercase();
         let owner = self.value("HEADER", "owner").to_lowercase();
-        let is_linear = named == "rtl" || (named != "rta" && owner.contains("linear"));
+        if let Some(other) = OTHER_TESTS.iter().find(|other| owner.contains(*other)) {
+            bail!("Owner is {owner:?}: {other} is no positioning test, and is not read");
+        }
+        let is_linear = named == "rtl" || (named.is_empty() && owner.contains("linear"));
         match (is_linear, self.axis()) {
             (true, Some(axis)) if !axis.is_linear() => bail!(
                 "a file of lengths (rtl), and its axis is {axis}: correct \"Axis:\" under USER-TEXT::"
@@ -292,8 +303,22 @@ impl File {
             (false, Some(axis)) if axis.is_linear() => bail!(
                 "angles along the linear axis {axis} (pitch or yaw) are no positioning test, and are not read"
             ),
+            (false, None) if !owner.contains("rotary") => bail!(
+                "a file of angles (rta) that names no axis: enter A, B or C as \"Axis:\" under USER-TEXT::; pitch and yaw of a linear \
+                 axis are not read"
+            ),
             (false, _) => Ok(Kind::Rotary),
         }
+    }
+
+    /// A doubt where something was entered as the axis that names none.
+    fn doubt_axis(&self) -> Option<String> {
+        let entered = self.value("USER-TEXT", "axis");
+        (self.axis().is_none() && !entered.is_empty()).then(|| {
+            format!(
+                "warning, Axis is {entered:?}, none of X, Y, Z, A, B, C: correct it under USER-TEXT::, or state the axis in a map"
+            )
+        })
     }
 
     /// The axis that was entered as a letter, such as `X` or `Axis X`.
@@ -327,7 +352,6 @@ impl File {
             .value("TARGET DATA", "flags")
             .split_whitespace()
             .collect();
-        let is_empty = |pass: &Vec<Reading>| pass.iter().all(|one| one.deviation.abs() <= 0.0);
         let is_up = |pass: &Vec<Reading>| match (pass.first(), pass.last()) {
             (Some(first), Some(last)) => last.target > first.target,
             _ => false,
@@ -350,22 +374,6 @@ impl File {
             _ => vec![],
         }
     }
-}
-
-/// The way of a pass, by the order of its targets.
-fn way_of(number: u32, pass: &[Reading]) -> Result<&'static str> {
-    let mut way = 0.0;
-    for two in pass.windows(2) {
-        let step = two[1].target - two[0].target;
-        if step.abs() <= 0.0 || step * way < 0.0 {
-            bail!(
-                "line {}: run {number} goes to and fro: runs that pass their targets one way each are read",
-                two[1].line
-            );
-        }
-        way = step;
-    }
-    Ok(if way < 0.0 { "down" } else { "up" })
 }
 
 fn number(word: &str, what: &str) -> Result<f64> {
@@ -463,11 +471,6 @@ mod tests {
             ),
             (
                 "1   2      -1.25",
-                "1   0  -1.25",
-                "line 25: target 0: must be from 1 to 3",
-            ),
-            (
-                "1   2      -1.25",
                 "3   2  -1.25",
                 "line 25: run 3: must be from 1 to 2, the Run-count",
             ),
@@ -478,18 +481,8 @@ mod tests {
             ),
             (
                 "1   2      -1.25",
-                "99999999999   2  -1.25",
-                "is no number of a run",
-            ),
-            (
-                "1   2      -1.25",
                 "1   1  -1.25",
                 "line 25: run 1 goes to and fro",
-            ),
-            (
-                "1   3      2",
-                "1   1      2",
-                "line 26: run 1 goes to and fro",
             ),
             (
                 "Run Target Data: ",
@@ -499,7 +492,12 @@ mod tests {
             (
                 "File type  : rtl\r\nOwner      : Linear",
                 "File type  : rts\r\nOwner      : Straightness",
-                "File type is \"rts\", Owner \"straightness\": rtl",
+                "Owner is \"straightness\": straight is no positioning test",
+            ),
+            (
+                "File type  : rtl\r\nOwner      : Linear",
+                "File type  : rts\r\nOwner      : other linear",
+                "File type is \"rts\", Owner \"other linear\": rtl",
             ),
             (
                 "Axis:Axis Y",
@@ -525,9 +523,9 @@ mod tests {
             ),
             "{said}"
         );
-        // A measurement that was broken off is whole as a file.
+        // A measurement that was broken off is whole as a file, without the pass that is none.
         let short = MADE.replace("2   2      1\r\n2   1      0.75\r\n", "");
-        assert_eq!(rows(&short).len(), 4);
+        assert_eq!(rows(&short).len(), 3);
     }
 
     #[test]
@@ -576,7 +574,12 @@ mod tests {
             ["Target [deg]", "Deviation [mrad]"]
         );
         let unnamed = rotary.replace("Axis:C", "Axis:");
+        assert!(refused(&unnamed).contains("a file of angles (rta) that names no axis"));
+        let unnamed = unnamed.replace("Linear", "Rotary");
         assert_eq!(super::cells(&unnamed).unwrap().sheet.lines[0].1.len(), 4);
+        let odd = MADE.replace("Axis:Axis Y", "Axis:W");
+        let said = super::cells(&odd).unwrap().remarks.join("\n");
+        assert!(said.contains("Axis is \"W\", none of X, Y, Z"), "{said}");
     }
 
     #[test]

@@ -96,12 +96,13 @@ fn ordered(test: &Test, table: &Table) -> Result<Runs> {
         is_order_known &= counted.is_order_known;
     }
     remarks.extend(passes::without_readings(&mut runs));
+    // Before passes are paired: with its partner a short one is half a run.
+    remarks.extend(passes::broken_off(&runs));
     remarks.extend(passes::pair(&mut runs));
     check_directions(&runs, units)?;
     let doubt = listed::doubt(&runs);
     is_order_known &= doubt.is_none();
     remarks.extend(doubt);
-    remarks.extend(passes::broken_off(&runs));
     remarks.extend(check_targets(&runs, units)?);
     Ok(Runs {
         runs,

@@ -4,6 +4,7 @@ use metrology::yaml::shown;
 
 use super::recognise::{Recognised, Role, role_of_name};
 use super::sheet::Sheet;
+use super::stated;
 
 /// Names of quantities that a line of names has at least.
 const LEAST_NAMES: usize = 2;
@@ -11,6 +12,30 @@ const LEAST_NAMES: usize = 2;
 /// Whether a cell has a digit of any script.
 pub fn has_digit(cell: &str) -> bool {
     cell.contains(char::is_numeric)
+}
+
+/// Rows among which a line of units may stand below the names.
+const UNIT_ROWS: usize = 2;
+
+/// The first line of names above numbers; `n_words` and `n_numbers` count those of a line's cells.
+pub fn names_at(
+    lines: &[(u64, Vec<String>)],
+    n_words: impl Fn(&[String]) -> usize,
+    n_numbers: impl Fn(&[String]) -> usize,
+) -> Option<usize> {
+    let at = (0..lines.len()).find(|k| {
+        let cells = &lines[*k].1;
+        let mut below = lines[k + 1..].iter().take(UNIT_ROWS);
+        n_words(cells) >= LEAST_NAMES
+            && n_words(cells) > n_numbers(cells)
+            && below.any(|(_, cells)| n_numbers(cells) >= 2)
+    })?;
+    // `Units;inch` above the names is no line of names.
+    let is_next = lines.get(at + 1).is_some_and(|(_, next)| {
+        let is_unit_row = stated::is_row(next.iter().map(String::as_str));
+        !is_unit_row && n_numbers(next) == 0 && n_words(next) > n_words(&lines[at].1)
+    });
+    Some(if is_next { at + 1 } else { at })
 }
 
 /// The line of names above cells of which hardly one is a number.
