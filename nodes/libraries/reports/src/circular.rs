@@ -129,7 +129,7 @@ fn section(
     let evaluated = evaluate(&test, &reading.measured.budget);
     match &evaluated {
         Ok(result) => state_figures(&mut section, (group, reading), &test, result)?,
-        Err(error) => section.not_evaluated(error),
+        Err(error) => section.without_figures(error),
     }
     if !refused.is_empty() {
         section.figures["not_evaluated"] = serde_json::json!(refused);

@@ -61,6 +61,8 @@ pub struct Section {
     pub warnings: Vec<Warning>,
     /// What the first screen has of it, where that is not its first answer.
     pub tile: Option<Tile>,
+    /// Why a test that was measured has no figure.
+    pub unevaluated: Option<String>,
 }
 
 /// A sentence on what was not evaluated or not used.
@@ -109,6 +111,12 @@ impl Section {
     /// The line of a test that has no result, with the reason.
     pub fn not_evaluated(&mut self, why: impl Display) {
         self.warn(NOT_EVALUATED, format!("Not evaluated: {why}."));
+    }
+
+    /// The same of a test that was measured and has no figure at all: the recording was not used as it should be.
+    pub fn without_figures(&mut self, why: impl Display) {
+        self.unevaluated = Some(why.to_string());
+        self.not_evaluated(why);
     }
 
     /// A line for everything of a test that was left out.

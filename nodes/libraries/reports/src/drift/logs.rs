@@ -34,7 +34,7 @@ pub(super) fn section(
     ));
     let points = &log.displacements.points;
     let (Some((from, first_mm)), Some((to, _))) = (points.first(), points.last()) else {
-        section.not_evaluated("no displacement was read");
+        section.without_figures("no displacement was read");
         return Ok(section);
     };
     let values: Vec<(f64, f64)> = points
@@ -65,7 +65,7 @@ pub(super) fn section(
             Some(found)
         }
         Err(why) => {
-            section.not_evaluated(why);
+            section.without_figures(why);
             None
         }
     };

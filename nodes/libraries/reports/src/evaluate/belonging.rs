@@ -266,10 +266,16 @@ impl Belonging {
         for further in further {
             self.leave_out(further.held, Reason::OtherAxis, further.what);
         }
+        let reason = contradiction(&open.begin, &end);
+        let test = match reason {
+            // Of a begin that names another kind the test is that of its end.
+            Some(_) => test.or_else(|| open.evaluated_as(&end)),
+            None => test,
+        };
         let Some(test) = test else {
             return end;
         };
-        if let Some(reason) = contradiction(&open.begin, &end) {
+        if let Some(reason) = reason {
             self.contradicts(open, &reason);
             self.not_evaluated.push(NotEvaluated { run, test, reason });
             return TestSegment {

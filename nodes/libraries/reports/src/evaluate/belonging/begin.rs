@@ -1,5 +1,7 @@
 //! What begin and end of a run may state.
 
+use std::fmt::Debug;
+
 use metrology::number::number;
 use metrology::sample::{FARTHEST_FROM_NOMINAL, Sense, TestKind, TestPlane, TestSegment};
 
@@ -60,6 +62,56 @@ pub(super) fn contradiction(begin: &TestSegment, end: &TestSegment) -> Option<St
     let differs = names
         .into_iter()
         .find(|(_, first, last)| *last != 0 && first != last);
+    let in_words = |name: &str, first: &dyn Debug, last: &dyn Debug| {
+        format!("{name} = {first:?} at its begin and {last:?} at its end")
+    };
+    differs
+        .map(|(name, first, last)| in_words(name, &first, &last))
+        .or_else(|| {
+            // Its number is 0, as that of a kind that is not stated.
+            let is_stated = end.kind != TestKind::Latency || states_all(end);
+            (is_stated && end.kind != begin.kind).then(|| in_words("kind", &begin.kind, &end.kind))
+        })
+        .or_else(|| states_all(end).then(|| of_whole(begin, end)).flatten())
+}
+
+/// Whether an end repeats what its begin stated: the numbers of its test are there.
+fn states_all(end: &TestSegment) -> bool {
+    end.radius_mm.abs() > SAME_NUMBER || end.feed_mm_s.abs() > SAME_NUMBER
+}
+
+/// The other fields, of an end that states them all.
+fn of_whole(begin: &TestSegment, end: &TestSegment) -> Option<String> {
+    let in_m = |segment: &TestSegment| {
+        let both = [segment.centre_mm, segment.tool_offset_mm];
+        both.map(|mm| {
+            mm.iter()
+                .map(|mm| number(mm * 1e-3))
+                .collect::<Vec<_>>()
+                .join(" ")
+        })
+    };
+    let ([centre, offset], [end_centre, end_offset]) = (in_m(begin), in_m(end));
+    let fields = [
+        ("centre", centre, end_centre),
+        ("tool_offset", offset, end_offset),
+        (
+            "stations",
+            begin.stations.to_string(),
+            end.stations.to_string(),
+        ),
+        (
+            "zero_id",
+            begin.zero_id.to_string(),
+            end.zero_id.to_string(),
+        ),
+        (
+            "setup_id",
+            begin.setup_id.to_string(),
+            end.setup_id.to_string(),
+        ),
+    ];
+    let differs = fields.into_iter().find(|(_, first, last)| first != last);
     differs
         .map(|(name, first, last)| format!("{name} = {first} at its begin and {last} at its end"))
 }
@@ -135,5 +187,39 @@ mod tests {
         other.plane = TestPlane::Zx;
         let words = "plane = 1 at its begin and 3 at its end";
         assert_eq!(contradiction(&begin, &other).as_deref(), Some(words));
+        type Change = fn(&mut TestSegment);
+        let cases: [(Change, &str); 6] = [
+            (
+                |it| it.kind = TestKind::Latency,
+                "kind = Circle at its begin and Latency at its end",
+            ),
+            (
+                |it| it.centre_mm.x = 50.0,
+                "centre = 0 0 0 at its begin and 0.05 0 0 at its end",
+            ),
+            (
+                |it| it.tool_offset_mm.z = 100.0,
+                "tool_offset = 0 0 0 at its begin and 0 0 0.1 at its end",
+            ),
+            (
+                |it| it.stations = 36,
+                "stations = 0 at its begin and 36 at its end",
+            ),
+            (|it| it.zero_id += 1, "zero_id = "),
+            (|it| it.setup_id += 1, "setup_id = "),
+        ];
+        for (change, words) in cases {
+            let mut other = circle();
+            change(&mut other);
+            let said = contradiction(&begin, &other).unwrap_or_default();
+            assert!(said.starts_with(words), "{said}");
+            // An end that states nothing of it contradicts nothing.
+            let mut bare = TestSegment::of_kind(TestKind::Circle, 2, Stamp::from_nanos(9));
+            bare.completed = true;
+            assert_eq!(
+                contradiction(&other, &bare).is_some(),
+                other.kind != TestKind::Circle
+            );
+        }
     }
 }

@@ -151,7 +151,11 @@ impl Open {
 
     /// Which test of the report it would have been; none: the report evaluates no such run as a whole.
     pub(super) fn evaluated(&self) -> Option<String> {
-        let begin = &self.begin;
+        self.evaluated_as(&self.begin)
+    }
+
+    /// The same, where another message says what it was.
+    pub(super) fn evaluated_as(&self, begin: &TestSegment) -> Option<String> {
         let has = |name: &str| self.held.iter().any(|held| held.topic.ends_with(name));
         let what = begin.features.join(" ");
         let plane = format!("{:?}", begin.plane).to_uppercase();
