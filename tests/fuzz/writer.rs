@@ -27,7 +27,7 @@ impl Writer {
         self.at += Span::from_secs_f64(time_s);
     }
 
-    pub fn wait_until(&mut self, time_s: f64) -> Result<()> {
+    pub fn begin_row(&mut self, time_s: f64) -> Result<()> {
         let at = self.start + Span::from_secs_f64(time_s);
         if at < self.at {
             bail!("time {time_s} s: must not be before the row above");

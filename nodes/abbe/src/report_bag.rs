@@ -156,8 +156,8 @@ impl ReportBag {
             &tests,
             table.as_ref().map(|table| table.bag.as_path()),
         );
-        let code = loss::exit_code(tests.is_whole() && n_odd == 0);
-        alarms::ended(alarms.as_ref(), kept, code)
+        let is_whole = tests.is_whole() && is_evaluated(&report) && n_odd == 0;
+        alarms::ended(alarms.as_ref(), kept, loss::exit_code(is_whole))
     }
 
     /// The page with the figures judged by their limits, and those that are kept as alarms.
@@ -317,12 +317,18 @@ fn judged_page(
             "conditions": conditions.section.figures,
             "machine_defaults": defaults,
             "not_completed": not_completed(&tests.broken_off),
-            "not_evaluated": not_evaluated(&tests.not_evaluated),
+            "not_evaluated": not_evaluated(&tests.not_evaluated, &sections),
             "tests": figures,
             "conformance": conformance,
         }),
         lines: lines.into_iter().chain(defaults_line).collect(),
     })
+}
+
+/// Whether every test that was measured has a figure.
+fn is_evaluated(report: &Report) -> bool {
+    let without = report.figures["not_evaluated"].as_array();
+    without.is_none_or(Vec::is_empty)
 }
 
 /// What was lost, broken off or not evaluated, in words.
@@ -359,10 +365,15 @@ fn not_completed(runs: &[BrokenOff]) -> serde_json::Value {
     runs.iter().map(row).collect()
 }
 
-/// The runs that were measured and have no figure, for machines.
-fn not_evaluated(runs: &[NotEvaluated]) -> serde_json::Value {
+/// The runs, and the tests of several runs, that were measured and have no figure, for machines.
+fn not_evaluated(runs: &[NotEvaluated], sections: &[Section]) -> serde_json::Value {
     let row = |it: &NotEvaluated| serde_json::json!({ "run": it.run, "test": it.test, "reason": it.reason });
-    runs.iter().map(row).collect()
+    let of_section = |section: &Section| {
+        let reason = section.unevaluated.as_ref()?;
+        Some(serde_json::json!({ "run": null, "test": section.title, "reason": reason }))
+    };
+    let runs = runs.iter().map(row);
+    runs.chain(sections.iter().filter_map(of_section)).collect()
 }
 
 fn uncertainty(stated: bool) -> serde_json::Value {

@@ -39,6 +39,43 @@ pub fn plane(head: &[String], lines: &Lines) -> Option<(String, Plane)> {
     first(head, lines, PLANE_NAMES, plane_of)
 }
 
+/// What is wrong with a column of axes or planes whose words are none.
+pub fn odd(head: &[String], lines: &Lines) -> Option<String> {
+    let of_planes = || {
+        odd_cell(head, lines, PLANE_NAMES, |cell| plane_of(cell).is_some()).map(|odd| {
+            format!("{odd}: must be XY, YZ or ZX; XZ is ZX seen from the other side: write ZX and turn the sense round")
+        })
+    };
+    let of_axes = || {
+        odd_cell(head, lines, AXIS_NAMES, |cell| axis_of(cell).is_some()).map(|odd| {
+            format!("{odd}: must be X, Y, Z, A, B or C: correct it, or rename the column where it says something else")
+        })
+    };
+    of_planes().or_else(of_axes)
+}
+
+/// The first cell of a column of this name alone that says nothing, where hardly one does.
+fn odd_cell(
+    head: &[String],
+    lines: &Lines,
+    names: &[&str],
+    says: fn(&str) -> bool,
+) -> Option<String> {
+    let is_named = |name: &&String| names.contains(&name.trim().to_lowercase().as_str());
+    let k = head.iter().position(|name| is_named(&name))?;
+    let (n, n_said) = cells(lines, k).fold((0_usize, 0_usize), |(n, n_said), (_, cell)| {
+        (n + 1, n_said + usize::from(says(cell)))
+    });
+    let (line, cell) = cells(lines, k).find(|(_, cell)| !says(cell))?;
+    (2 * n_said <= n).then(|| {
+        format!(
+            "line {line}, column \"{}\": \"{}\"",
+            shown(&head[k]),
+            shown(cell)
+        )
+    })
+}
+
 /// Refuses rows of another axis, plane or sense than that of the map. `rows` are those that were read.
 ///
 /// # Errors
@@ -88,9 +125,9 @@ fn axis_of(cell: &str) -> Option<Axis> {
 
 fn plane_of(cell: &str) -> Option<Plane> {
     match cell.trim().to_uppercase().as_str() {
-        "XY" => Some(Plane::Xy),
-        "YZ" => Some(Plane::Yz),
-        "ZX" => Some(Plane::Zx),
+        "XY" | "G17" => Some(Plane::Xy),
+        "YZ" | "G19" => Some(Plane::Yz),
+        "ZX" | "G18" => Some(Plane::Zx),
         _ => None,
     }
 }

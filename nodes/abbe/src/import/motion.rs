@@ -412,7 +412,7 @@ fn log<'a>(
     let mut has_begun = false;
     for (line, row) in rows {
         writer
-            .wait_until(row[0] - begin_s)
+            .begin_row(row[0] - begin_s)
             .with_context(|| format!("line {line}: time {} s", row[0]))?;
         if !has_begun {
             writer.segment(test, true)?;

@@ -11,7 +11,6 @@ use super::pass_names;
 use super::recognise::{Known, Recognised, Role};
 use super::separators;
 use super::stated::{in_one_line, quoted};
-use super::times;
 use super::units::{Kind, Unit};
 pub use likely::{doubt, doubt_of_targets};
 use likely::{likely_deviation, likely_target};
@@ -36,6 +35,9 @@ pub struct Proposal {
 pub fn of(path: &Path) -> Result<Proposal> {
     let looked = looked::at(path)?;
     let found = looked.found.with_context(|| separators::no_names(path))?;
+    if let Some(odd) = &found.odd {
+        bail!("{odd}");
+    }
     let stem = path.file_stem().map(|stem| stem.to_string_lossy());
     let axis = found.axis(&stem.unwrap_or_default());
     let mut text = Text::new(&found, path);
@@ -388,54 +390,6 @@ impl<'t> Text<'t> {
         Ok(())
     }
 
-    /// The unit of times that are numbers: named, or that of an epoch.
-    fn time_unit(&mut self, time: &Known) -> Result<()> {
-        if time.unknown.is_some() {
-            return self.unit(time, Unit::Second, None);
-        }
-        let first = time.numbers.first().copied().unwrap_or(0.0);
-        let named = time.unit.filter(|unit| unit.kind() == Kind::Time);
-        if named.is_none() {
-            self.needed.extend(epochs::check(time, first)?);
-        }
-        let of_epoch = || {
-            let (word, _) = metrology::epoch::likely_unit(first)?;
-            match word {
-                "milliseconds" => Some(Unit::Ms),
-                "microseconds" => Some(Unit::Us),
-                "nanoseconds" => Some(Unit::Ns),
-                _ => None,
-            }
-        };
-        let known = named.or_else(of_epoch);
-        if known.is_none() {
-            let likely = times::likely(&time.numbers);
-            let taken = likely.unwrap_or(Unit::Second);
-            let as_seconds = match likely {
-                Some(_) => format!("; {}", times::in_words(&time.numbers, Unit::Second)),
-                None => String::new(),
-            };
-            self.needed.push(format!(
-                "column \"{}\": no unit in its name, read in {}: {}{as_seconds}; correct it where it is another",
-                time.name,
-                taken.name(),
-                times::in_words(&time.numbers, taken),
-            ));
-        }
-        let unit = known
-            .or_else(|| times::likely(&time.numbers))
-            .unwrap_or(Unit::Second);
-        let first_s = unit.convert(first, Unit::Second);
-        if first_s > 6e8 {
-            self.start_s = first_s;
-        }
-        let told = Known {
-            unit: Some(unit),
-            ..time.clone()
-        };
-        self.unit(&told, Unit::Second, None)
-    }
-
     fn circle(&mut self) -> Result<()> {
         let found = self.found;
         let angle = found.first(Role::Angle).context("no column of angles")?;
@@ -596,3 +550,4 @@ mod radial;
 mod sign;
 #[cfg(test)]
 mod tests;
+mod time_unit;

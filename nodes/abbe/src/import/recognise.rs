@@ -85,6 +85,8 @@ pub struct Recognised {
     pub axis_column: Option<(String, Axis)>,
     /// A column of planes, with the first of them.
     pub plane_column: Option<(String, Plane)>,
+    /// What is wrong with a column of axes or planes whose words are none.
+    pub odd: Option<String>,
 }
 
 /// Rows that are looked at for what a column holds.
@@ -142,6 +144,7 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
         date_column: sheet.dates.and_then(|place| head.get(place).cloned()),
         axis_column: beside::axis(head, &lines[at + 1..]),
         plane_column: beside::plane(head, &lines[at + 1..]),
+        odd: beside::odd(head, &lines[at + 1..]),
     })
 }
 

@@ -27,6 +27,9 @@ pub struct Writer {
     /// Of the instant at hand: channel, length and hash of each message.
     written: BTreeSet<(usize, usize, u64)>,
     repeated: u64,
+    /// The instant of the row at hand, and how many rows before it have the same.
+    row: Option<(Stamp<metrology::Host>, i64)>,
+    crowded: u64,
 }
 
 /// Counts of a finished bag.
@@ -36,17 +39,23 @@ pub struct BagCount {
     pub messages: u64,
     /// Readings that were not written, since the bag has an equal one of the same time.
     pub repeated: u64,
+    /// Rows of the time of the row before them.
+    pub crowded: u64,
 }
 
 impl BagCount {
-    /// A line about readings that were not written.
-    pub fn in_words(self) -> Option<String> {
-        let n = self.repeated;
-        (n > 0).then(|| {
+    /// Lines about readings that were not written, and rows that were written apart.
+    pub fn in_words(self) -> Vec<String> {
+        let (n, n_crowded) = (self.repeated, self.crowded);
+        let repeated = (n > 0).then(|| {
             format!(
                 "{n} readings have time and value of one before them in their column: written once"
             )
-        })
+        });
+        let crowded = (n_crowded > 0).then(|| {
+            format!("{n_crowded} rows have the time of the row before them: written 1 ns apart, in their order")
+        });
+        repeated.into_iter().chain(crowded).collect()
     }
 }
 
@@ -87,6 +96,8 @@ impl Writer {
             messages: 0,
             written: BTreeSet::new(),
             repeated: 0,
+            row: None,
+            crowded: 0,
         })
     }
 
@@ -116,6 +127,26 @@ impl Writer {
         }
         self.go_to(at);
         Ok(())
+    }
+
+    /// Goes to the time of a row of a log. Of several rows with one time, as of a logger that writes whole minutes, none is lost.
+    ///
+    /// # Errors
+    /// When it has passed.
+    pub fn begin_row(&mut self, time_s: f64) -> Result<()> {
+        let at = self.start + Span::from_secs_f64(time_s);
+        match self.row {
+            Some((before, n)) if before == at => {
+                self.row = Some((at, n + 1));
+                self.crowded += 1;
+                self.go_to(at + Span::from_nanos(n + 1));
+                Ok(())
+            }
+            _ => {
+                self.row = Some((at, 0));
+                self.wait_until(time_s)
+            }
+        }
     }
 
     /// One tick of the axes.
@@ -222,6 +253,7 @@ impl Writer {
         Ok(BagCount {
             messages: self.messages,
             repeated: self.repeated,
+            crowded: self.crowded,
         })
     }
 
@@ -320,7 +352,7 @@ mod tests {
     fn rows_of_one_time_leave_no_repeated_message_and_are_counted() {
         let usual = [(0.0, 1.0, 20.0), (60.0, 1.5, 20.0), (120.0, 2.0, 20.1)];
         assert_eq!(log(&usual).repeated, 0);
-        assert_eq!(log(&usual).in_words(), None);
+        assert!(log(&usual).in_words().is_empty());
         for (second, repeated) in [
             ((60.0, 1.6, 20.0), 1),
             ((60.0, 1.5, 20.3), 1),
@@ -332,12 +364,45 @@ mod tests {
             let [first, before, after] = usual;
             let found = log(&[first, before, second, after]);
             assert_eq!(found.repeated, repeated, "{second:?}");
-            let is_named = found.in_words().is_some_and(|line| {
+            let is_named = found.in_words().first().is_some_and(|line| {
                 line.starts_with(&format!("{repeated} readings have time and value"))
             });
             assert_eq!(is_named, repeated > 0);
         }
         let all_at_once = vec![(0.0, 1.0, 20.0); 50];
         assert_eq!(log(&all_at_once).repeated, 98);
+    }
+
+    #[test]
+    fn rows_of_a_coarse_clock_are_all_kept_in_their_order() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("bag");
+        let machine = MachineFile::parse(MACHINE, "machine.yaml").unwrap();
+        let of_machine = (&machine, MACHINE.to_owned());
+        let mut writer = Writer::begin(&path, of_machine, 1_767_600_000, None).unwrap();
+        for k in 0..30_u32 {
+            writer.begin_row(f64::from(k / 10) * 60.0).unwrap();
+            writer.length(Axis::Z, f64::from(k % 3)).unwrap();
+        }
+        assert!(writer.begin_row(60.0).is_err(), "time goes on");
+        let written = writer.finish().unwrap();
+        assert_eq!((written.crowded, written.repeated), (27, 0));
+        assert!(written.in_words()[0].starts_with("27 rows have the time of the row before"));
+        let mut read = vec![];
+        let bag = Bag::open(&path).unwrap();
+        reading::read(
+            &bag,
+            Order::LogTime,
+            &[topics::LENGTH_POSITION.name],
+            |mut taken| {
+                if let Some(length) = taken.of(&topics::LENGTH_POSITION) {
+                    read.push((length.at.nanos(), length.displacement_mm));
+                }
+            },
+        );
+        let heights: Vec<f64> = read.iter().map(|(_, mm)| *mm).collect();
+        let wanted: Vec<f64> = (0..30).map(|k| f64::from(k % 3)).collect();
+        assert_eq!(heights, wanted);
+        assert!(read.is_sorted_by(|a, b| a.0 < b.0));
     }
 }

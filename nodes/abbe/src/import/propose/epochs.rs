@@ -6,6 +6,7 @@ use metrology::{Host, epoch};
 
 use super::super::recognise::Known;
 use super::super::times;
+use super::super::units::Unit;
 
 /// From 1990 to 2100, s since 1970 (`date -u -d 1990-01-01 +%s`): measurements are in between.
 const MEASURED_S: [f64; 2] = [631_152_000.0, 4_102_444_800.0];
@@ -19,6 +20,16 @@ const TICKS_A_SECOND: f64 = 1e7;
 const LABVIEW_1970_S: f64 = 2_082_844_800.0;
 /// No measurement is later, s since 1970: 2060.
 const LATEST_S: f64 = 2_840_140_800.0;
+
+/// 1970 in the days of Excel, since 1899-12-30 (a cell of 1970-01-01 shown as a number).
+const EXCEL_1970_D: f64 = 25_569.0;
+const DAY_S: f64 = 86_400.0;
+
+/// The begin of a column of days since 1899-12-30, s since 1970; none where they are days since 1970 or since the begin.
+pub fn of_excel(unit: Unit, first: f64) -> Option<f64> {
+    let begin_s = (first - EXCEL_1970_D) * DAY_S;
+    (unit == Unit::Day && (MEASURED_S[0]..LATEST_S).contains(&begin_s)).then_some(begin_s)
+}
 
 /// The first time of a column, s since 1970 or of its day; none of a plain number.
 ///
@@ -80,6 +91,21 @@ mod tests {
         let text = format!("time,z_um\n{first},0.1\n{},0.2\n", first + 60.0);
         let found = of_text(&text).unwrap().unwrap();
         check(found.first(Role::Time).unwrap(), first)
+    }
+
+    #[test]
+    fn days_of_excel_are_known_by_their_size() {
+        // Excel shows 2026-03-28 22:30 as 46109.9375; `date -u -d "2026-03-28 22:30" +%s`.
+        let begin_s = of_excel(Unit::Day, 46_109.937_5).unwrap();
+        assert!((begin_s - 1_774_737_000.0).abs() < 1e-6, "{begin_s}");
+        for (unit, first) in [
+            (Unit::Day, 20_540.9),
+            (Unit::Day, 0.5),
+            (Unit::Second, 46_109.9),
+            (Unit::Day, 73_000.0),
+        ] {
+            assert_eq!(of_excel(unit, first), None, "{first}");
+        }
     }
 
     #[test]
