@@ -5,6 +5,7 @@ use iso230::budget::DeviceUncertainty;
 use iso230::probing::{self, Artefact, FormResult, RING_POINTS, SPHERE_POINTS, Side};
 use machine::cycle::FeatureId;
 use machine::file::CertificateEntry;
+use metrology::number::number;
 use metrology::sample::{FeatureKind, ProbedFeature, ProbedPoint, Rejection};
 use metrology::stamp::{Host, Stamp};
 use nalgebra::Vector3;
@@ -37,7 +38,13 @@ struct Found {
     size_error: Option<ExpandedLength>,
     certificate: Option<String>,
     not_evaluated: Option<String>,
+    /// Whether one of its touches is of something else.
+    #[serde(skip)]
+    has_slip: bool,
 }
+
+/// Greatest form error of a shape that was touched, mm: beyond it a touch is of something else, or was latched wrongly.
+const GREATEST_FORM_MM: f64 = 0.5;
 
 /// The part, where a round shape was touched.
 pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section> {
@@ -67,6 +74,8 @@ pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section>
                 section.lines.push(line);
             }
         }
+        let slipped = found.iter().find(|one| one.has_slip);
+        section.unevaluated = slipped.and_then(|one| one.not_evaluated.clone());
         section.tables.push(Rows {
             head: head(&[
                 "feature",
@@ -240,15 +249,19 @@ fn evaluated(
     let is_sphere = feature.kind == FeatureKind::Sphere;
     let artefact = artefact(tests, feature, certificate, budget);
     let drift_mm = drift_mm(budget);
-    let result = if is_sphere {
-        probing::sphere(&points, &artefact, drift_mm)
-    } else {
+    let of = |points: &[Vector3<f64>]| {
+        if is_sphere {
+            return probing::sphere(points, &artefact, drift_mm);
+        }
         let flat: Vec<_> = points.iter().map(Vector3::xy).collect();
         probing::ring(&flat, &artefact, drift_mm)
     };
-    let (why, result) = match result {
-        Ok(result) => (None, Some(result)),
-        Err(error) => (Some(error.to_string()), None),
+    let form_mm = |points: &[Vector3<f64>]| of(points).ok().map(|one| one.form_error.value_mm);
+    let slip = slip(&points, form_mm);
+    let (why, result) = match (of(&points), &slip) {
+        (Ok(_), Some(why)) => (Some(why.clone()), None),
+        (Ok(result), None) => (None, Some(result)),
+        (Err(error), _) => (Some(error.to_string()), None),
     };
     let stated = |of: fn(&FormResult) -> ExpandedLength| {
         let known = certificate.and(result.as_ref());
@@ -270,7 +283,34 @@ fn evaluated(
         size_error: stated(|one| one.size_error),
         certificate: certificate.map(|one| one.number.clone().unwrap_or_default()),
         not_evaluated: why,
+        has_slip: slip.is_some(),
     }
+}
+
+/// Why touches are not those of one shape: the one without which the others are nearest to it.
+fn slip(
+    points: &[Vector3<f64>],
+    form_mm: impl Fn(&[Vector3<f64>]) -> Option<f64>,
+) -> Option<String> {
+    let found_mm = form_mm(points).filter(|mm| *mm > GREATEST_FORM_MM)?;
+    let without = |out: usize| {
+        let mut others = points.to_vec();
+        others.remove(out);
+        Some((out, form_mm(&others)?))
+    };
+    let nearest = (0..points.len()).filter_map(without);
+    let (place, left_mm) = nearest.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let at = points[place].iter().map(|mm| number(*mm));
+    Some(format!(
+        "form error of {} µm, at most {} µm: touch {} of {}, at ({}) mm, is the farthest from the others, which have {} µm without it: \
+         repeat the measurement",
+        um(found_mm),
+        um(GREATEST_FORM_MM),
+        place + 1,
+        points.len(),
+        at.collect::<Vec<_>>().join(", "),
+        um(left_mm)
+    ))
 }
 
 impl Found {
@@ -444,5 +484,22 @@ environmental_drift_um: 0.6
         assert!((form - reference("form_mm").as_f64().unwrap()).abs() < 1e-9);
         let why = "high: the machine file has no certificate of it (certificates): no size error, and its own form is in P_FTU.";
         assert_eq!(section.lines, [why]);
+    }
+
+    #[test]
+    fn a_touch_that_is_not_of_the_shape_takes_its_figure_away_by_name() {
+        let sphere = |k: u32| {
+            let (turn, tilt) = (f64::from(k) * 2.399, f64::from(k) / 25.0 * 1.5);
+            12.5 * Vector3::new(turn.cos() * tilt.sin(), turn.sin() * tilt.sin(), tilt.cos())
+        };
+        let form_mm = |points: &[Vector3<f64>]| {
+            let radii = points.iter().map(|point| point.norm());
+            Some(radii.clone().fold(0.0, f64::max) - radii.fold(f64::INFINITY, f64::min))
+        };
+        let mut points: Vec<Vector3<f64>> = (0..25).map(sphere).collect();
+        assert_eq!(slip(&points, form_mm), None);
+        points[17].x = 0.0;
+        let said = slip(&points, form_mm).unwrap();
+        assert!(said.contains("touch 18 of 25, at (0, "), "{said}");
     }
 }
