@@ -97,6 +97,35 @@ impl OrderFile {
         PROGRAMS.check_amount(|| "slice_s".to_owned(), "programs", amount(self.slice_s))
     }
 
+    /// Lines and programs that are whole ones.
+    fn check_times(&self, range_s: f64) -> Result<()> {
+        let times = [("bin_s", self.bin_s), ("slice_s", self.slice_s)];
+        for (key, time_s) in times {
+            ensure!(
+                (1.0..=86_400.0).contains(&time_s),
+                "{key} = {time_s} s: must be from 1 to 86400 s"
+            );
+        }
+        let is_whole = |time_s: f64| {
+            let lines = time_s / self.bin_s;
+            lines >= 1.0 && (lines - lines.round()).abs() < 1e-9
+        };
+        ensure!(
+            is_whole(self.slice_s),
+            "slice_s = {} s: must be a whole multiple of bin_s, {} s",
+            self.slice_s,
+            self.bin_s
+        );
+        ensure!(
+            is_whole(range_s),
+            "to: {range_s} s from {} to {}: must be a whole multiple of bin_s, {} s",
+            self.from,
+            self.to,
+            self.bin_s
+        );
+        Ok(())
+    }
+
     /// The order, checked against the machine.
     ///
     /// # Errors
@@ -110,20 +139,7 @@ impl OrderFile {
         );
         let (from, to) = (stamp("from", &self.from)?, stamp("to", &self.to)?);
         ensure!(from < to, "to: must be after from");
-        let times = [("bin_s", self.bin_s), ("slice_s", self.slice_s)];
-        for (key, time_s) in times {
-            ensure!(
-                (1.0..=86_400.0).contains(&time_s),
-                "{key} = {time_s} s: must be from 1 to 86400 s"
-            );
-        }
-        let lines = self.slice_s / self.bin_s;
-        ensure!(
-            lines >= 1.0 && (lines - lines.round()).abs() < 1e-9,
-            "slice_s = {} s: must be a whole multiple of bin_s, {} s",
-            self.slice_s,
-            self.bin_s
-        );
+        self.check_times((to - from).as_secs_f64())?;
         self.bounded((to - from).as_secs_f64())?;
         let windows = [self.x_mm, self.y_mm, self.z_mm];
         let mut feed_limit_mm_min = f64::INFINITY;
@@ -261,6 +277,18 @@ impl ImportShift {
                 "{log}: warning: no line from {spans}: what was logged last holds there, and axes rest"
             );
         }
+        for (axis, spans) in &shift.without_position {
+            let spans = named(spans);
+            complain!(
+                "{log}: warning: no position of {axis} from {spans}: it rests there in the programs"
+            );
+        }
+        if !shift.not_followed.is_empty() {
+            let keys = shift.not_followed.join(", ");
+            complain!(
+                "{log}: warning: the programs do not follow the positions of {keys}: X, Y and Z are read by `is: position`, a key for each"
+            );
+        }
         if !shift.without_spindle.is_empty() {
             let spans = named(&shift.without_spindle);
             complain!(
@@ -355,6 +383,11 @@ mod tests {
                 "slice_s: 1440 programs: at most 1000",
             ),
             ("bin_s: 10.0", "bin_s: 0.0", "must be from 1 to 86400 s"),
+            (
+                "T15:15:00Z",
+                "T15:15:07Z",
+                "must be a whole multiple of bin_s, 10 s",
+            ),
             (
                 "x_mm: [-60.0, 180.0]",
                 "x_mm: [-60.0, -59.9999]",

@@ -79,7 +79,7 @@ pub enum BridgeError {
     },
     /// The log never says how fast the spindle turns.
     #[error(
-        "spindle \"{name}\": the log has no speed of it from {from} to {to} (UTC): correct its key in the mapping, or take another range"
+        "spindle \"{name}\": the log has no speed of it from {from} to {to} (UTC): correct its key in the mapping, or take another range; {account}"
     )]
     SilentSpindle {
         /// Its name.
@@ -88,6 +88,8 @@ pub enum BridgeError {
         from: String,
         /// Last one.
         to: String,
+        /// What of the log was taken and left out.
+        account: String,
     },
     /// The log has no value within the shift.
     #[error(

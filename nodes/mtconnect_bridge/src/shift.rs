@@ -36,7 +36,7 @@ mod tests;
 
 pub use doubtful::DoubtfulSpeed;
 use doubtful::Speeds;
-use once::Once;
+use once::{Once, Piece};
 pub use reading::{Shift, bins};
 
 /// A spindle that turns more slowly than this stands, 1/s.
@@ -133,6 +133,8 @@ struct Cutter {
     /// Times of which the log has the spindle, and each axis.
     turned: Once,
     travelled: PerAxis<Once>,
+    /// Times of which the log has where each axis is.
+    placed: PerAxis<Once>,
     /// Readings of the spindle within the order.
     speeds: Speeds,
 }
@@ -150,6 +152,7 @@ impl Cutter {
             axis_told: PerAxis::default(),
             turned: Once::default(),
             travelled: PerAxis::from_fn(|_| Once::default()),
+            placed: PerAxis::from_fn(|_| Once::default()),
             speeds: Speeds::default(),
         }
     }
@@ -203,6 +206,9 @@ impl Cutter {
                 let is_new = !self.travelled[axis].has(at);
                 if let Some(since) = self.axis_told[axis].replace(at) {
                     self.travelled[axis].tell(since, at);
+                    if before.is_some() {
+                        self.placed[axis].tell(since, at);
+                    }
                 }
                 let bin = self.place(at).and_then(|place| self.bins.get_mut(place));
                 if let (Some(bin), Some(travel_mm), true) = (bin, travel_mm, is_new) {
@@ -211,6 +217,22 @@ impl Cutter {
                 is_new
             }
         }
+    }
+
+    /// Spans of an order, of a line of a program at least, in which the log does not say where an axis is.
+    fn unplaced(&mut self, axis: Axis, order: &ShiftOrder) -> Vec<Piece> {
+        if let (Some(since), Some(_)) = (self.axis_told[axis], self.position_mm[axis]) {
+            self.placed[axis].tell(since, order.to);
+        }
+        let mut missing = self.placed[axis].missing(order.from, order.to);
+        missing.retain(|(from, to)| (*to - *from).as_secs_f64() >= order.bin_s);
+        missing
+    }
+
+    /// The same of several axes; those that have none are left out.
+    fn without_position(&mut self, axes: &[Axis], order: &ShiftOrder) -> Vec<(Axis, Vec<Piece>)> {
+        let missing = axes.iter().map(|axis| (*axis, self.unplaced(*axis, order)));
+        missing.filter(|(_, spans)| !spans.is_empty()).collect()
     }
 
     /// The clock leaps: a speed holds to the last stamp before it, and from the first one behind it.

@@ -1,9 +1,10 @@
 //! A log that is read as a shift, with what it lacks of it.
 
+use metrology::Axis;
 use metrology::sample::Quantity;
 use metrology::stamp::{Host, Machine, Span, Stamp};
 
-use super::{Bin, Cutter, DoubtfulSpeed, Event, ShiftOrder, event};
+use super::{Bin, Cutter, DoubtfulSpeed, Event, Piece, ShiftOrder, event};
 use crate::account::Account;
 use crate::condition::words;
 use crate::error::BridgeError;
@@ -39,6 +40,10 @@ pub struct Shift {
     pub doubtful: Vec<DoubtfulSpeed>,
     /// Spans of the range in which the log does not say how fast the spindle turns: it stands in the programs.
     pub without_spindle: Vec<(Stamp<Machine>, Stamp<Machine>)>,
+    /// The same of the position of each axis that the mapping has: it rests in the programs.
+    pub without_position: Vec<(Axis, Vec<Piece>)>,
+    /// Positions of the mapping that the programs do not follow: of several axes at once, and of rotary axes.
+    pub not_followed: Vec<String>,
     /// Spans of the range, longer than a line of the programs, in which the log has no line: its last values hold.
     pub silent: Vec<(Stamp<Machine>, Stamp<Machine>)>,
     /// Whether nothing is missing that would change the programs.
@@ -249,8 +254,11 @@ pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, 
             name: order.spindle.clone(),
             from: words(order.from),
             to: words(order.to),
+            account: reader.account.to_string(),
         });
     }
+    let (axes, not_followed) = positions(mapping);
+    let without_position = reader.cutter.without_position(&axes, order);
     // What is shorter than one line of a program cannot be seen in it.
     without_spindle.retain(|span| length_s(&[*span]) >= order.bin_s);
     let covered_s = length_s(&covered);
@@ -263,11 +271,33 @@ pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, 
         bins: reader.cutter.bins,
         is_whole: is_covered && leaps.is_empty() && account.is_whole(),
         without_spindle,
+        without_position,
+        not_followed,
         silent: reader.silent,
         account,
         covered,
         leaps,
     })
+}
+
+/// The axes whose positions the programs follow, and the keys of the positions that they do not.
+fn positions(mapping: &Mapping) -> (Vec<Axis>, Vec<String>) {
+    let (mut followed, mut others) = (vec![], vec![]);
+    for (key, used) in mapping.uses() {
+        let Use::Position {
+            axes,
+            commanded: false,
+            ..
+        } = used
+        else {
+            continue;
+        };
+        match axes.as_slice() {
+            [axis] if axis.is_linear() => followed.push(*axis),
+            _ => others.push(key.to_owned()),
+        }
+    }
+    (followed, others)
 }
 
 /// Length of some spans together, s.

@@ -78,6 +78,28 @@ fn a_time_without_a_speed_is_named_and_none_at_all_is_refused() {
     );
 }
 
+/// By hand: X is told until 10:00:06 and from 10:00:22 on; Y, which the mapping has, never.
+#[test]
+fn times_without_a_position_and_positions_that_are_not_followed_are_named() {
+    let map = "values:\n  Xabs: {is: position, axis: X, unit: MILLIMETER}\n  Yabs: {is: position, axis: Y, unit: MILLIMETER}\n  Babs: {is: position, axis: B, unit: DEGREE}\n  Srpm: {is: spindle_speed, name: spindle, unit: REVOLUTION/MINUTE}\n";
+    let mapping = Mapping::new(&MapFile::from_yaml(map).unwrap()).unwrap();
+    let log = LOG
+        .join("\n")
+        .replace("10:00:06Z|Xabs|5", "10:00:06Z|Xabs|UNAVAILABLE");
+    let shift = bins(log.as_bytes(), &mapping, &order()).unwrap();
+    let seconds = |span: &(Stamp<Machine>, Stamp<Machine>)| {
+        [span.0, span.1].map(|at| (at - order().from).as_secs_f64().round())
+    };
+    let found: Vec<_> = shift
+        .without_position
+        .iter()
+        .map(|(axis, spans)| (*axis, spans.iter().map(seconds).collect::<Vec<_>>()))
+        .collect();
+    let wanted = vec![(Axis::X, vec![[6.0, 22.0]]), (Axis::Y, vec![[0.0, 30.0]])];
+    assert_eq!(found, wanted);
+    assert_eq!(shift.not_followed, ["Babs"]);
+}
+
 #[test]
 fn eq3_a_program_goes_the_travel_within_its_window_and_lasts_the_time() {
     let bins = bins(LOG.join("\n").as_bytes(), &mapping(), &order())
