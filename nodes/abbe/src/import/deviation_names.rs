@@ -6,7 +6,8 @@
 
 use super::pass_names::axis_of;
 use super::recognise::{Known, Recognised, Role, parts};
-use super::units::Unit;
+use super::stated;
+use super::units::{Kind, Unit};
 use super::vocabulary::words;
 
 /// Words for a deviation.
@@ -224,7 +225,22 @@ pub fn doubt(name: &str) -> Option<String> {
     {
         return Some("/".to_owned());
     }
-    all.into_iter().find(|word| !is_known(word))
+    let is_length = |word: &&String| {
+        Unit::of_word(word).is_some_and(|unit| matches!(unit.kind(), Kind::Length | Kind::Angle))
+    };
+    // `in` is a word beside a unit, and one by itself in brackets.
+    let every = words(name);
+    let mut lengths = every.iter().filter(|word| *word != "in").filter(is_length);
+    if let (Some(first), Some(second)) = (lengths.next(), lengths.next())
+        && first != second
+    {
+        return Some(format!("{first}, {second}"));
+    }
+    // A word in the place of a unit is refused as one that is not known.
+    let unit = stated::of(name).unknown();
+    let is_unit = |word: &String| unit.as_ref().is_some_and(|unit| words(unit).contains(word));
+    all.into_iter()
+        .find(|word| !is_known(word) && !is_unit(word))
 }
 
 fn is_known(word: &str) -> bool {
@@ -352,7 +368,7 @@ mod tests {
             "backlash error;lost motion error;following error;contouring error;servo error;Schleppfehler",
             "Fehlernummer;error flag;error code;deviation sum;cumulative error;incremental error",
             "diff to previous;-error um;\u{2212}error um;neg. error;inverted error;1/error;error (um)/2",
-            "half error;error*10;error x10;deviation x 1000 mm;EYX error um;Lateral deviation um",
+            "half error;error*10;error x10;deviation x 1000 mm;Deviation mm (um);EYX error um;Lateral deviation um",
             "vertical deviation um;horizontal deviation um;normal deviation um;cross deviation um",
             "median error;worst error;allowed error",
         ];

@@ -42,6 +42,13 @@ const OF_A_TEST: &[&str] = &[
     "instrument",
     "placement",
     "setup",
+    "quantity",
+    "messgröße",
+    "messgroesse",
+    "grandeur",
+    "type",
+    "typ",
+    "kind",
 ];
 /// Other words of such names, whole but for digits at their ends.
 const WHOLE: &[&str] = &["line", "place", "height"];
@@ -104,6 +111,13 @@ const MARKS: &[&str] = &[
     "kept",
     "good",
     "masked",
+    "valide",
+    "valable",
+    "bewertung",
+    "beurteilung",
+    "rating",
+    "assessment",
+    "verdict",
 ];
 /// Words before them that say nothing.
 const BEFORE_MARKS: &[&str] = &["is", "row", "point", "data", "reading", "to", "be", "not"];
@@ -219,7 +233,11 @@ fn is_mark(name: &str) -> bool {
 fn noted(name: &str, cells: &[Cell<'_>]) -> Result<()> {
     let is_marking = |text: &str| {
         let is_sign = |letter: char| !letter.is_alphanumeric() && !matches!(letter, '-' | '.');
-        MARKING.contains(&text.to_lowercase().as_str())
+        let lower = text.to_lowercase();
+        let is_word = |word: &str| word.len() > 1 && MARKING.contains(&word);
+        let mut words = lower.split(|letter: char| !letter.is_alphanumeric());
+        MARKING.contains(&lower.as_str())
+            || words.any(is_word)
             || (!text.is_empty() && text.chars().all(is_sign))
     };
     // A letter beside other letters is the name of an axis.

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use metrology::Axis;
+use metrology::yaml::shown;
 
 use super::map::{Direction, Map, Plane, Test, units};
 use super::pass_names;
@@ -178,6 +179,15 @@ impl<'t> Text<'t> {
 
     /// States the unit of a column that is read in `wanted`; of one without a unit that cannot be right the `likely` one.
     fn unit(&mut self, column: &Known, wanted: Unit, likely: Option<Unit>) -> Result<()> {
+        if let Some([with, without]) = &column.thousands {
+            bail!(
+                "column \"{}\": \"{}\" and \"{}\": every separator has three digits behind it and some numbers have none, as where it marks \
+                 thousands: write the numbers without it; or all with decimals, where it stands before decimals",
+                shown(&column.name),
+                shown(with),
+                shown(without)
+            );
+        }
         if let Some(word) = &column.unknown {
             self.needed.push(format!(
                 "column \"{}\": its unit \"{word}\" is not known: state it in units as one of {}",

@@ -46,6 +46,8 @@ pub struct Known {
     pub unknown: Option<String>,
     /// Its cells that are numbers.
     pub numbers: Vec<f64>,
+    /// Two cells by which its separators are those of thousands: one with and one without.
+    pub thousands: Option<[String; 2]>,
     /// Its first cell.
     pub first: String,
     /// Its first cell that is no number, with its line.
@@ -248,6 +250,7 @@ fn known(name: &str, below: Stated, lines: &[(u64, &str)], decimal: char) -> Kno
         unit,
         unknown,
         numbers,
+        thousands: unread::thousands(cells, decimal),
         first: first(cells, decimal).to_owned(),
         odd: odd(lines, decimal),
     }

@@ -69,6 +69,34 @@ pub fn has_decimal_commas(sheet: &Sheet) -> bool {
     })
 }
 
+/// Two cells by which the separators of a column are those of thousands and not of decimals: three digits stand behind each, none
+/// begins with a zero, and some cells have none. One with and one without.
+pub fn thousands(cells: &[&str], separator: char) -> Option<[String; 2]> {
+    let bare = |cell: &str| {
+        let signs = ['-', '+', '\u{2212}', '\u{2013}', ' '];
+        cell.trim_start_matches(signs).to_owned()
+    };
+    let is_digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let mut found = [None, None];
+    for cell in cells {
+        let text = bare(cell);
+        match text.split_once(separator) {
+            Some((front, behind)) if is_digits(front) && is_digits(behind) => {
+                if behind.len() != 3 || front.starts_with('0') {
+                    return None;
+                }
+                found[0].get_or_insert((*cell).to_owned());
+            }
+            None if is_digits(&text) && text.len() <= 3 && !text.starts_with('0') => {
+                found[1].get_or_insert((*cell).to_owned());
+            }
+            _ => {}
+        }
+    }
+    let [with, without] = found;
+    Some([with?, without?])
+}
+
 /// A sentence for each column that is a quantity by its name and has cells that are no numbers; none without any.
 pub fn in_words(found: &Recognised) -> Option<String> {
     let columns = found.columns.iter().filter_map(|column| {

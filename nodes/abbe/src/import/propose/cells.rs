@@ -64,3 +64,27 @@ fn decimal_commas_in_quotes_are_read_and_commas_of_thousands_are_named() {
         assert_eq!(of_text(text).unwrap().unwrap().decimal, '.');
     }
 }
+
+#[test]
+fn separators_of_thousands_are_not_read_as_decimals() {
+    // German and English thousands in every column: um and nm.
+    for (head, rows) in [
+        (
+            "run;direction;target [um];deviation [nm]",
+            "1;up;-280.000;-7.680\n1;up;-20.100;-940\n1;up;0;1.140\n",
+        ),
+        (
+            "run\tdirection\ttarget [um]\tdeviation [nm]",
+            "1\tup\t-280,000\t-7,680\n1\tup\t-20,100\t-940\n1\tup\t0\t1,140\n",
+        ),
+    ] {
+        let refused = refusal(&format!("{head}\n{rows}"));
+        assert!(refused.contains("as where it marks thousands"), "{refused}");
+    }
+    // Three decimals everywhere, a zero in front, or fewer decimals.
+    for cells in [["-280.125", "10.500"], ["0.125", "3"], ["12.5", "7"]] {
+        let rows = cells.map(|cell| format!("1;up;{cell};0.51\n")).concat();
+        let map = refusal(&format!("run;direction;target_mm;deviation_um\n{rows}"));
+        assert!(map.contains("deviation_um: \"deviation_um\""), "{map}");
+    }
+}

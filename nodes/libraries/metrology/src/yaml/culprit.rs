@@ -70,15 +70,22 @@ fn one_below(
     let is_tag = |child: usize| places.name(child).is_some_and(|name| TAGS.contains(&name));
     let children: Vec<usize> = places.children(node).collect();
     let tags: Vec<usize> = children.iter().copied().filter(|at| is_tag(*at)).collect();
+    let is_same = |kept: &[usize]| {
+        let text = places.with_only(node, kept);
+        let error = text.and_then(|text| again(&text));
+        error.is_some_and(|error| words(&error) == wanted)
+    };
+    if is_same(&tags) {
+        // It is of the name of the choice, or of the whole: of nothing below.
+        return (tags.len() == 1).then(|| tags[0]);
+    }
     children.into_iter().find(|child| {
         *n_left = n_left.saturating_sub(1);
         if *n_left == 0 || is_tag(*child) {
             return false;
         }
         let kept: Vec<usize> = tags.iter().copied().chain([*child]).collect();
-        let text = places.with_only(node, &kept);
-        let error = text.and_then(|text| again(&text));
-        error.is_some_and(|error| words(&error) == wanted)
+        is_same(&kept)
     })
 }
 

@@ -308,7 +308,7 @@ fn anchors_aliases_and_merge_keys_are_refused_without_words_of_the_library() {
             "name: m\naxes: &a\n  X: *a\n",
             "stands inside of its own anchor",
         ),
-        ("name: *a\naxes: {}\n", "is not defined above by `&`"),
+        ("name: *a\naxes: {}\n", "is not defined above by `&a`"),
         (
             "name: m\naxes:\n  X: &x {lead_mm: 1.0}\n  Y: {<<: *x, <<: 3}\n",
             "",
@@ -320,7 +320,7 @@ fn anchors_aliases_and_merge_keys_are_refused_without_words_of_the_library() {
         ("name: m\naxes:\n  X: &x {led_mm: 1.0}\n  Y: *x\n", "led_mm"),
         (
             "name: m\naxes: {}\nsteps: [&a {do: wait, seconds: *b}]\n",
-            "is not defined above by `&`",
+            "is not defined above by `&b`",
         ),
     ] {
         let words = refused(text);
