@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use metrology::Axis;
 
 use super::map::Direction;
-use super::recognise::{Recognised, Role, parts};
+use super::recognise::{Known, Recognised, Role, parts};
 use super::stated::{self, Stated};
 
 /// Words of runs.
@@ -189,6 +189,29 @@ pub fn check(found: &Recognised) -> Result<()> {
     Ok(())
 }
 
+/// Refuses passes from one side beside as many columns of numbers that nobody names: they may be those from the other side.
+///
+/// # Errors
+/// With the first name of each.
+pub fn check_sides(found: &Recognised) -> Result<()> {
+    let passes = found.passes();
+    let is_one_way = passes.windows(2).all(|two| two[0].1 == two[1].1);
+    let n_rows = passes.first().map_or(0, |(column, _)| column.numbers.len());
+    let is_open = |column: &&Known| {
+        matches!(column.role, None | Some(Role::Displacement)) && 2 * column.numbers.len() > n_rows
+    };
+    let others: Vec<&Known> = found.columns.iter().filter(is_open).collect();
+    match (&passes[..], &others[..]) {
+        ([(pass, _), _, ..], [other, ..]) if is_one_way && others.len() == passes.len() => bail!(
+            "columns \"{}\" and others are passes from one side, and as many columns as \"{}\" are not known: where they are those from \
+             the other side, name all in a map (passes_um); otherwise take them out",
+            pass.name,
+            other.name
+        ),
+        _ => Ok(()),
+    }
+}
+
 /// A sentence on columns with a direction that are no passes by what else their names say; empty without any.
 pub fn unsure(found: &Recognised) -> String {
     let columns = found.columns.iter().filter(|column| {
@@ -300,5 +323,27 @@ mod tests {
         assert!(found.passes().is_empty());
         assert!(unsure(&found).contains("\"up 1 compensated [um]\""));
         assert_eq!(unsure(&table(&|k, way| format!("{way} {k}"), &[])), "");
+    }
+
+    #[test]
+    fn as_many_unknown_columns_beside_passes_from_one_side_may_be_the_others() {
+        use super::super::recognise::of_text;
+        for (head, is_refused) in [
+            ("target_mm,1 up,1 zurueck,2 up,2 zurueck", true),
+            ("target_mm,1 up,1 down,2 up,2 down", false),
+            ("target_mm,1 up,2 up,humidity", false),
+            ("target_mm,1 up,2 up", false),
+        ] {
+            let n = head.split(',').count();
+            let row = |k: usize| {
+                let cells = (0..n).map(|column| format!("{}.{k}", 7 * column + k));
+                cells.collect::<Vec<_>>().join(",")
+            };
+            let rows: Vec<String> = (1..5).map(row).collect();
+            let found = of_text(&format!("{head}\n{}\n", rows.join("\n")))
+                .unwrap()
+                .unwrap();
+            assert_eq!(check_sides(&found).is_err(), is_refused, "{head}");
+        }
     }
 }

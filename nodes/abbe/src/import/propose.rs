@@ -307,6 +307,7 @@ impl<'t> Text<'t> {
             (Some(read), _) => {
                 sign::check(found, read)?;
                 across::check(found, read)?;
+                across::check_positions(found, &[read])?;
                 self.read(key("deviation_um", "deviation_arcsec"), read);
                 self.unit(read, deviation, likely_deviation(&[read], deviation))?;
             }
@@ -322,8 +323,10 @@ impl<'t> Text<'t> {
 
     fn passes(&mut self, passes: &[(&Known, Direction)], key: &str, wanted: Unit) -> Result<()> {
         pass_names::check(self.found)?;
+        pass_names::check_sides(self.found)?;
         let _ = writeln!(self.test, "    {key}:");
         let columns: Vec<&Known> = passes.iter().map(|(column, _)| *column).collect();
+        across::check_positions(self.found, &columns)?;
         let likely = likely_deviation(&columns, wanted);
         for (column, direction) in passes {
             let word = match direction {

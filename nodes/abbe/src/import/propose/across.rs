@@ -24,6 +24,45 @@ pub fn check(found: &Recognised, read: &Known) -> Result<()> {
     }
 }
 
+/// Numbers that follow the targets closer than this share of their range are positions and no deviations.
+const SAME_SHARE: f64 = 0.01;
+/// Fewest targets by which that is seen.
+const LEAST_TARGETS: usize = 3;
+
+/// Refuses columns of deviations that hold the measured positions themselves.
+///
+/// # Errors
+/// With the name and the remedy.
+pub fn check_positions(found: &Recognised, columns: &[&Known]) -> Result<()> {
+    let Some(target) = found.first(Role::Target) else {
+        return Ok(());
+    };
+    let targets = &target.numbers;
+    let ends = targets
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], one| {
+            [low.min(*one), high.max(*one)]
+        });
+    let range = ends[1] - ends[0];
+    let are_same = |column: &&&Known| {
+        let pairs = || targets.iter().zip(&column.numbers);
+        column.numbers.len() == targets.len()
+            && targets.len() >= LEAST_TARGETS
+            && range > 0.0
+            && pairs().all(|(target, number)| (number - target).abs() < SAME_SHARE * range)
+    };
+    match columns.iter().find(are_same) {
+        Some(column) => bail!(
+            "column \"{}\": its numbers are the targets of \"{}\" within {} % of their range: measured positions and no deviations; \
+             subtract the targets, or write a row for each reading and name the column as measured_mm in a map",
+            column.name,
+            target.name,
+            100.0 * SAME_SHARE
+        ),
+        None => Ok(()),
+    }
+}
+
 /// The one axis whose letter stands in a name.
 fn axis(name: &str) -> Option<Axis> {
     let words = name.split(|letter: char| !letter.is_alphanumeric());
@@ -55,6 +94,28 @@ mod tests {
             let read = found.first(Role::Deviation).unwrap();
             let checked = check(&found, read).map_err(|error| error.to_string());
             assert_eq!(checked.is_err(), is_across, "{head}: {checked:?}");
+        }
+    }
+
+    #[test]
+    fn numbers_that_are_the_targets_are_positions() {
+        let table = |head: &str, rows: &[[f64; 2]]| {
+            let rows: String = rows.iter().map(|[a, b]| format!("{a},{b}\n")).collect();
+            of_text(&format!("{head}\n{rows}")).unwrap().unwrap()
+        };
+        let head = "target_mm,1 up";
+        for (rows, is_position) in [
+            ([[-280.0, -280.008], [0.0, 0.002], [280.0, 280.009]], true),
+            ([[-280.0, -8.0], [0.0, 2.0], [280.0, 9.0]], false),
+            ([[0.0, 0.5], [10.0, 4.0], [20.0, 9.0]], false),
+        ] {
+            let found = table(head, &rows);
+            let passes: Vec<&Known> = found.passes().into_iter().map(|(one, _)| one).collect();
+            assert_eq!(
+                check_positions(&found, &passes).is_err(),
+                is_position,
+                "{rows:?}"
+            );
         }
     }
 }
