@@ -16,6 +16,7 @@
 //! message never refuses a bag.
 
 pub mod account;
+mod by_stamp;
 mod difference;
 mod error;
 mod inputs;

@@ -8,6 +8,7 @@ use abbe_msgs::{FieldParts, Message, Wire, from_cdr, parts_of};
 use recorder::{Bag, Event, Loss, MessageRef, Order};
 
 use crate::account::{Account, Place, Reason, TopicAccount};
+use crate::by_stamp::ByStamp;
 use crate::known::{entry_in_any_namespace, unreadable};
 use crate::leap::Leaps;
 use crate::repeats::{self, Repeats};
@@ -71,6 +72,21 @@ pub struct Taken<'a> {
 /// and outliers of thermometers (`outliers`) are left out and counted. A begin of a run before the end of the last one at one log
 /// time is handed on behind it (`turned`).
 pub fn read(bag: &Bag, order: Order, wanted: &[&str], take: impl FnMut(Taken<'_>)) -> Reading {
+    read_through(bag, (order, None), wanted, take)
+}
+
+/// The same by log time, where axis states and readings of instruments come in the order of their stamps (`by_stamp`).
+pub fn read_by_stamp(bag: &Bag, wanted: &[&str], take: impl FnMut(Taken<'_>)) -> Reading {
+    let by_stamp = Some(ByStamp::default());
+    read_through(bag, (Order::LogTime, by_stamp), wanted, take)
+}
+
+fn read_through(
+    bag: &Bag,
+    (order, by_stamp): (Order, Option<ByStamp>),
+    wanted: &[&str],
+    take: impl FnMut(Taken<'_>),
+) -> Reading {
     let mut reading = Reading {
         losses: bag.description_losses().to_vec(),
         ..Reading::default()
@@ -90,6 +106,7 @@ pub fn read(bag: &Bag, order: Order, wanted: &[&str], take: impl FnMut(Taken<'_>
         wrong_stamps,
         passed: Repeats::default(),
         turned: Turned::default(),
+        by_stamp,
         take,
     };
     let mut messages = bag.messages(order);
@@ -104,12 +121,18 @@ pub fn read(bag: &Bag, order: Order, wanted: &[&str], take: impl FnMut(Taken<'_>
         };
         let at = message.log_time_nanos;
         reading.leaps.pass(before.replace(at).unwrap_or(at), at);
-        let overdue = reader.turned.overdue(at);
-        reader.hand_on(overdue);
+        if let Some(overdue) = reader.turned.overdue(at) {
+            reader.pass_on(overdue);
+        }
+        reader.hand_on_due(at);
         reader.message(&plans[message.topic.index()], message);
     }
-    let held = reader.turned.rest();
-    reader.hand_on(held);
+    if let Some(held) = reader.turned.rest() {
+        reader.pass_on(held);
+    }
+    while let Some(held) = reader.by_stamp.as_mut().and_then(ByStamp::rest) {
+        reader.hand_on(&held);
+    }
     reading
 }
 
@@ -119,6 +142,7 @@ struct Reader<'r, F> {
     wrong_stamps: WrongStamps,
     passed: Repeats,
     turned: Turned,
+    by_stamp: Option<ByStamp>,
     take: F,
 }
 
@@ -150,26 +174,45 @@ impl<F: FnMut(Taken<'_>)> Reader<'_, F> {
                 if turn == Turn::Later {
                     return;
                 }
-                (self.take)(Taken {
-                    entry,
-                    message,
-                    row,
-                    number,
-                    is_counted: false,
-                });
-                if turn == Turn::BeforeHeld {
-                    let held = self.turned.rest();
-                    self.hand_on(held);
+                if let Some(by_stamp) = &mut self.by_stamp {
+                    by_stamp.take(Held::of(&message, entry, (*place, number)));
+                } else {
+                    (self.take)(Taken {
+                        entry,
+                        message,
+                        row,
+                        number,
+                        is_counted: false,
+                    });
+                }
+                if turn == Turn::BeforeHeld
+                    && let Some(held) = self.turned.rest()
+                {
+                    self.pass_on(held);
                 }
             }
         }
     }
 
+    /// Hands on what waited for earlier messages, when one was recorded at this log time.
+    fn hand_on_due(&mut self, log_time_nanos: u64) {
+        let due = |by_stamp: &mut ByStamp| by_stamp.due(log_time_nanos);
+        while let Some(held) = self.by_stamp.as_mut().and_then(due) {
+            self.hand_on(&held);
+        }
+    }
+
+    /// A message that was held is the next one.
+    fn pass_on(&mut self, held: Held) {
+        match &mut self.by_stamp {
+            Some(by_stamp) => by_stamp.take(held),
+            None => self.hand_on(&held),
+        }
+    }
+
     /// Hands on a message that was held.
-    fn hand_on(&mut self, held: Option<Held>) {
-        if let Some(held) = held
-            && let Some(row) = self.rows.get_mut(held.place)
-        {
+    fn hand_on(&mut self, held: &Held) {
+        if let Some(row) = self.rows.get_mut(held.place) {
             (self.take)(Taken {
                 entry: held.entry,
                 message: held.message(),

@@ -37,7 +37,7 @@ mod clocks;
 use clocks::OtherClock;
 
 /// T of (2), ns: what a session of a diagnosis takes as the lateness of a sample, too.
-const TOLERANCE_NANOS: i64 = 2 * NANOS_PER_S;
+pub(crate) const TOLERANCE_NANOS: i64 = 2 * NANOS_PER_S;
 /// How far outside the bag's own times a stamp may lie where no message of its topic stands beside it, ns: messages of one
 /// test are stamped with its begin, and clocks of two hosts differ.
 const MARGIN_NANOS: i64 = 60 * NANOS_PER_S;

@@ -23,6 +23,24 @@ pub(crate) struct Held {
 }
 
 impl Held {
+    /// A message whose topic has this place in the account.
+    pub(crate) fn of(
+        message: &MessageRef<'_>,
+        entry: &'static Entry,
+        (place, number): (usize, u64),
+    ) -> Self {
+        Self {
+            place,
+            number,
+            entry,
+            topic: message.topic,
+            log_time_nanos: message.log_time_nanos,
+            publish_time_nanos: message.publish_time_nanos,
+            sequence: message.sequence,
+            data: message.data.to_vec(),
+        }
+    }
+
     /// The message as it was read.
     pub(crate) fn message(&self) -> MessageRef<'_> {
         MessageRef {
@@ -90,16 +108,7 @@ impl Turned {
             self.is_open = true;
             return Turn::Now;
         }
-        self.held = Some(Held {
-            place,
-            number,
-            entry,
-            topic: message.topic,
-            log_time_nanos: message.log_time_nanos,
-            publish_time_nanos: message.publish_time_nanos,
-            sequence: message.sequence,
-            data: message.data.to_vec(),
-        });
+        self.held = Some(Held::of(message, entry, (place, number)));
         Turn::Later
     }
 }

@@ -1,4 +1,5 @@
-//! A bag in which messages stand twice, and messages that two readers of one verb decode: each counts once.
+//! A bag in which messages stand twice, and messages that two readers of one verb decode: each counts once. And one whose
+//! topics came late.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
@@ -10,10 +11,29 @@ use recorder::{
 };
 use replayer::{Reading, Reason, reading};
 
+/// A bag of the tree.
+fn bag_of_tree(name: &str) -> Bag {
+    let bags = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../bags");
+    Bag::open(bags.join(name)).unwrap()
+}
+
 /// A copy of a bag of the tree with every message so many times; that of `bad` thermometers is cut.
 fn copied(home: &Path, times: usize, is_bad: fn(&str) -> bool) -> PathBuf {
-    let bags = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../bags");
-    let bag = Bag::open(bags.join("cold_reference")).unwrap();
+    copy(
+        home,
+        &bag_of_tree("cold_reference"),
+        (times, is_bad),
+        |_, _| 0,
+    )
+}
+
+/// A copy of a bag; `late_nanos` is how much later a message of a topic was recorded, by its number in the bag.
+fn copy(
+    home: &Path,
+    bag: &Bag,
+    (times, is_bad): (usize, fn(&str) -> bool),
+    late_nanos: impl Fn(&str, i64) -> i64,
+) -> PathBuf {
     let path = home.join("bag");
     let directory = Directory::create(&path).unwrap();
     let mut recording = Recording::begin(directory, "bag", RecorderConfig::default()).unwrap();
@@ -30,9 +50,12 @@ fn copied(home: &Path, times: usize, is_bad: fn(&str) -> bool) -> PathBuf {
         })
         .collect();
     let mut messages = bag.messages(Order::File);
+    let mut number = 0;
     while let Some(Event::Message(message)) = messages.next_event() {
+        number += 1;
+        let late_nanos = late_nanos(&bag.topic(message.topic).topic, number);
         let stamp = MessageStamp {
-            log_time_nanos: i64::try_from(message.log_time_nanos).unwrap(),
+            log_time_nanos: i64::try_from(message.log_time_nanos).unwrap() + late_nanos,
             publish_time_nanos: i64::try_from(message.publish_time_nanos).unwrap(),
             sequence: message.sequence,
         };
@@ -104,5 +127,83 @@ fn a_message_that_several_readers_decode_is_counted_once() {
         let left_out: u64 = row.left_out.iter().map(|it| it.messages).sum();
         assert_eq!(row.used + left_out, row.messages, "{row:?}");
         assert_eq!(left_out > 0, is_bad(&row.topic), "{row:?}");
+    }
+}
+
+/// Stamps of states and readings as they are handed on, ns, each with whether it is a state.
+fn by_stamp(bag: &Bag) -> Vec<(bool, i64)> {
+    let wanted = [
+        topics::AXES_STATE.name,
+        topics::GRID_POSITION.name,
+        topics::TEST_SEGMENT.name,
+    ];
+    let mut got = vec![];
+    let mut last = None;
+    let found = reading::read_by_stamp(bag, &wanted, |mut taken| {
+        if taken.is(&topics::AXES_STATE) {
+            got.extend(
+                taken
+                    .of(&topics::AXES_STATE)
+                    .map(|it| (true, it.received_at.nanos())),
+            );
+        } else if taken.is(&topics::GRID_POSITION) {
+            got.extend(
+                taken
+                    .of(&topics::GRID_POSITION)
+                    .map(|it| (false, it.at.nanos())),
+            );
+        } else if let Some(segment) = taken.of(&topics::TEST_SEGMENT) {
+            let now = (segment.run, !segment.begin);
+            assert!(last.is_none_or(|before| before < now), "{last:?} {now:?}");
+            last = Some(now);
+        }
+    });
+    assert!(found.is_whole(), "{:?}", found.lines());
+    got
+}
+
+#[test]
+fn readings_come_by_their_stamps_however_late_a_topic_was_recorded() {
+    let bag = bag_of_tree("grid_circles");
+    let wanted = by_stamp(&bag);
+    assert!(wanted.len() > 1_000 && wanted.is_sorted_by_key(|(_, nanos)| *nanos));
+    const MS: i64 = 1_000_000;
+    let late: [fn(&str, i64) -> i64; 4] = [
+        |topic, _| {
+            if topic == "/axes/state" {
+                1_900 * MS
+            } else {
+                0
+            }
+        },
+        |topic, _| {
+            if topic == "/grid/position" {
+                1_900 * MS
+            } else {
+                0
+            }
+        },
+        |_, number| number * 7_919 % 97 * MS,
+        |topic, number| {
+            if topic == "/axes/state" {
+                number * 31 % 89 * MS
+            } else {
+                0
+            }
+        },
+    ];
+    for (k, late_nanos) in late.into_iter().enumerate() {
+        let home = tempfile::tempdir().unwrap();
+        let none: fn(&str) -> bool = |_| false;
+        let path = copy(home.path(), &bag, (1, none), |topic, number| {
+            // Begins and ends keep their order.
+            if topic == "/test/segment" {
+                0
+            } else {
+                late_nanos(topic, number)
+            }
+        });
+        let found = by_stamp(&Bag::open(path).unwrap());
+        assert!(found == wanted, "{k}: {} of {}", found.len(), wanted.len());
     }
 }

@@ -8,7 +8,7 @@ use metrology::sample::{
     AxisCompensation, AxisState, BlockMeasurement, GeometryModel, PositioningTable, ProbedFeature,
     ProbedPoint, TestSegment,
 };
-use recorder::{Bag, Loss, LossReason, Order};
+use recorder::{Bag, Loss, LossReason};
 use replayer::{Reading, Taken, reading};
 
 pub mod angular;
@@ -149,7 +149,7 @@ impl Tests {
             ..Collected::default()
         };
         collected.tests.machine = machine;
-        let reading = reading::read(bag, Order::LogTime, &WANTED, |mut taken| {
+        let reading = reading::read_by_stamp(bag, &WANTED, |mut taken| {
             collected.message(&mut taken);
         });
         let mut tests = collected.tests;
