@@ -15,6 +15,8 @@
 
 use std::collections::BTreeMap;
 
+use abbe_msgs::from_cdr;
+use abbe_msgs::msg::TestSegment;
 use abbe_msgs::topics::{self, Entry};
 use recorder::MessageRef;
 
@@ -22,11 +24,20 @@ use crate::reading::stamp_of;
 use crate::stamps::{TOLERANCE_NANOS, nanos_of};
 use crate::turned::Held;
 
+/// What comes first of one instant: a run begins, the axes are somewhere, there is a reading, the run ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Rank {
+    Begin,
+    Axes,
+    Reading,
+    End,
+}
+
 /// Messages that wait for earlier ones.
 #[derive(Default)]
 pub(crate) struct ByStamp {
-    /// By (1) to (3), equal ones as they came.
-    held: BTreeMap<(i64, u64), Held>,
+    /// By (1) to (3); of equal ones by [`Rank`], then as they came.
+    held: BTreeMap<(i64, Rank, u64), Held>,
     n_taken: u64,
     /// Of the last begin or end.
     segment_nanos: Option<i64>,
@@ -35,8 +46,8 @@ pub(crate) struct ByStamp {
 impl ByStamp {
     /// Takes a message.
     pub(crate) fn take(&mut self, held: Held) {
-        let key = self.key(&held.message(), held.entry);
-        self.held.insert((key, self.n_taken), held);
+        let (key, rank) = self.key(&held.message(), held.entry);
+        self.held.insert((key, rank, self.n_taken), held);
         self.n_taken += 1;
     }
 
@@ -52,7 +63,7 @@ impl ByStamp {
         self.held.pop_first().map(|(_, held)| held)
     }
 
-    fn key(&mut self, message: &MessageRef<'_>, entry: &Entry) -> i64 {
+    fn key(&mut self, message: &MessageRef<'_>, entry: &Entry) -> (i64, Rank) {
         let log = i64::try_from(message.log_time_nanos).unwrap_or(i64::MAX);
         let stamp = stamp_of(entry.description.type_name, message.data).map(nanos_of);
         let near = stamp.filter(|stamp| {
@@ -60,16 +71,28 @@ impl ByStamp {
         });
         if entry.name == topics::TEST_SEGMENT.name {
             let own = near.map_or(log, |stamp| stamp.min(log));
-            let key = self.segment_nanos.map_or(own, |before| before.max(own));
+            let before = self
+                .segment_nanos
+                .replace(own)
+                .filter(|before| *before >= own);
+            let key = before.unwrap_or(own);
             self.segment_nanos = Some(key);
-            return key;
+            let begins = from_cdr::<TestSegment>(message.data).is_ok_and(|segment| segment.begin);
+            // A begin at the instant of the end before it is behind that.
+            let is_first = begins && before.is_none();
+            return (key, if is_first { Rank::Begin } else { Rank::End });
         }
         let read = [
-            topics::AXES_STATE.name,
             topics::LENGTH_POSITION.name,
             topics::GRID_POSITION.name,
             topics::ANGLE_POSITION.name,
         ];
-        near.filter(|_| read.contains(&entry.name)).unwrap_or(log)
+        if entry.name == topics::AXES_STATE.name {
+            (near.unwrap_or(log), Rank::Axes)
+        } else if read.contains(&entry.name) {
+            (near.unwrap_or(log), Rank::Reading)
+        } else {
+            (log, Rank::Reading)
+        }
     }
 }

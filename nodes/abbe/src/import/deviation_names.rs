@@ -199,7 +199,7 @@ const HARMLESS: &[&str] = &[
     "ecc",
 ];
 /// Signs by which a name says that its numbers were multiplied, divided or turned.
-const MARKS: &[char] = &['*', '×', '·', '²', '^', '=', '%'];
+const SCALING_MARKS: &[char] = &['*', '×', '·', '²', '^', '=', '%'];
 
 /// The word, or the sign, by which a column may hold something else than readings; none where each is known.
 pub fn doubt(name: &str) -> Option<String> {
@@ -207,7 +207,7 @@ pub fn doubt(name: &str) -> Option<String> {
     if let Some(minus) = first.filter(|first| ['-', '\u{2212}', '\u{2013}', '±'].contains(first)) {
         return Some(minus.to_string());
     }
-    if let Some(mark) = name.chars().find(|letter| MARKS.contains(letter)) {
+    if let Some(mark) = name.chars().find(|letter| SCALING_MARKS.contains(letter)) {
         return Some(mark.to_string());
     }
     let digit_beside = |slash: usize| {
@@ -219,10 +219,10 @@ pub fn doubt(name: &str) -> Option<String> {
     let is_unit = |text: &String| Unit::of_word(text).is_some();
     let note = inner.filter(|inner| !is_unit(inner));
     all.extend(note.iter().flat_map(|note| words(note)));
-    if name
-        .match_indices('/')
-        .any(|(slash, _)| digit_beside(slash))
-    {
+    // A word in the place of a unit is refused as one that is not known.
+    let unit = stated::of(name).unknown();
+    let mut slashes = name.match_indices('/').map(|(slash, _)| slash);
+    if unit.is_none() && slashes.any(digit_beside) {
         return Some("/".to_owned());
     }
     let is_length = |word: &&String| {
@@ -236,8 +236,6 @@ pub fn doubt(name: &str) -> Option<String> {
     {
         return Some(format!("{first}, {second}"));
     }
-    // A word in the place of a unit is refused as one that is not known.
-    let unit = stated::of(name).unknown();
     let is_unit = |word: &String| unit.as_ref().is_some_and(|unit| words(unit).contains(word));
     all.into_iter()
         .find(|word| !is_known(word) && !is_unit(word))
@@ -313,11 +311,11 @@ pub fn unsure(found: &Recognised) -> String {
 
 /// Whether a name has a word for a deviation, with whatever else.
 fn is_one(name: &str) -> bool {
-    const BEGINS: [&str; 6] = ["dev", "err", "abw", "fehler", "diff", "delta"];
-    const ENDS: [&str; 4] = ["abweichung", "abweichungen", "fehler", "fehlers"];
+    const DEVIATION_BEGINS: [&str; 6] = ["dev", "err", "abw", "fehler", "diff", "delta"];
+    const DEVIATION_ENDS: [&str; 4] = ["abweichung", "abweichungen", "fehler", "fehlers"];
     words(name).iter().any(|word| {
-        BEGINS.iter().any(|begin| word.starts_with(begin))
-            || ENDS.iter().any(|end| word.ends_with(end))
+        DEVIATION_BEGINS.iter().any(|begin| word.starts_with(begin))
+            || DEVIATION_ENDS.iter().any(|end| word.ends_with(end))
     })
 }
 
@@ -373,7 +371,9 @@ mod tests {
             "median error;worst error;allowed error",
         ];
         for name in names.iter().flat_map(|names| names.split(';')) {
-            assert!(doubt(name).is_some(), "{name}");
+            // A short word is refused as a unit that is not known.
+            let is_refused = doubt(name).is_some() || stated::of(name).unknown().is_some();
+            assert!(is_refused, "{name}");
         }
     }
 }

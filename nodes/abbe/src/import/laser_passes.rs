@@ -23,7 +23,7 @@ const FEWEST_ZEROS: usize = 3;
 /// Most passes that are named.
 const NAMED: usize = 10;
 /// Deviations of a machine are larger than this, µm: smaller ones are of another unit.
-const LEAST_UM: f64 = 0.02;
+const LEAST_OF_MACHINES_UM: f64 = 0.02;
 
 /// Whether a pass has no other deviation than zero.
 pub fn is_empty(pass: &[Reading]) -> bool {
@@ -86,7 +86,7 @@ pub fn way_of(number: u32, pass: &[Reading]) -> Result<&'static str> {
 pub fn doubt_unit(passes: &Passes) -> Option<String> {
     let all = passes.values().flatten().map(|one| one.deviation.abs());
     let greatest = all.fold(0.0, f64::max);
-    (greatest > 0.0 && greatest < LEAST_UM).then(|| {
+    (greatest > 0.0 && greatest < LEAST_OF_MACHINES_UM).then(|| {
         format!("warning, no deviation is above {greatest} µm: the file states µm; are they in mm?")
     })
 }

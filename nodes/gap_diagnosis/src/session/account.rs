@@ -30,7 +30,7 @@ pub enum Reason {
     ClockJump,
     /// A reading between two axis states that lie too far apart.
     InGap,
-    /// A reading between two axis states at their usual distance, between which the acceleration changes too much for a
+    /// A reading between two axis states that are no further apart than others, between which the acceleration changes too much for a
     /// path that is known to 0.1 µm.
     TooUneven,
     /// A run with a hole in the axis states while they moved.

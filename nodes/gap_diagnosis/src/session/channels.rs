@@ -4,14 +4,14 @@ use std::ops::Range;
 
 use machine::MachineFile;
 use metrology::sample::TestKind;
-use metrology::stamp::{Host, Stamp};
+use metrology::stamp::{Host, Span, Stamp};
 use metrology::{Axis, PerAxis};
 use nalgebra::Vector3;
 use twin::simulate::plate_axes;
 use twin::{Channel, Motion};
 
 use super::account::{Account, Reason};
-use super::record::Record;
+use super::record::{Record, STANDING_S};
 use super::select::FULL_RATE;
 use super::standing::{Standing, both, standing};
 use super::thermometers;
@@ -271,8 +271,8 @@ impl Scope<'_> {
             let before = k
                 .checked_sub(1)
                 .map(|before| ticks[k].at - ticks[before].at);
-            let is_usual = before.is_some_and(|before| dt_s < FULL_RATE * before.as_secs_f64());
-            return Err(if is_usual {
+            let usual_s = before.map_or(0.0, Span::as_secs_f64).max(STANDING_S);
+            return Err(if dt_s < FULL_RATE * usual_s {
                 Reason::TooUneven
             } else {
                 Reason::InGap

@@ -97,7 +97,7 @@ pub(super) const MOST_READINGS: usize = 2_000_000;
 pub(super) const MOST_TEMPERATURES: usize = 100_000;
 
 /// Ticks of axes that stand are kept this far apart, s: nothing happens between them.
-const STANDING_S: f64 = 0.02;
+pub(super) const STANDING_S: f64 = 0.02;
 /// A command that changes by less stands, mm or rad.
 const STANDSTILL: f64 = 1e-6;
 

@@ -14,6 +14,7 @@ use crate::evaluate::test_conditions::TestConditions;
 mod faces;
 mod figures;
 mod logs;
+mod slips;
 mod tilt;
 
 /// Seconds of an hour.

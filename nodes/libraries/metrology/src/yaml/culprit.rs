@@ -11,7 +11,7 @@ use super::places::{Kind, Places};
 /// Keys that say which of several forms stands here.
 const TAGS: [&str; 3] = ["do", "is", "kind"];
 /// Largest text that is read again, values; and how often at most.
-const MOST_NODES: usize = 20_000;
+const MOST_NODES_AGAIN: usize = 20_000;
 const MOST_READINGS: usize = 400;
 
 /// Reads a text again, and tells what is wrong with it.
@@ -24,7 +24,7 @@ pub(super) fn culprit(
     node: usize,
     again: Again<'_>,
 ) -> Option<usize> {
-    if places.len() > MOST_NODES || !is_of_one_value(error) {
+    if places.len() > MOST_NODES_AGAIN || !is_of_one_value(error) {
         return None;
     }
     let wanted = words(error);

@@ -196,14 +196,14 @@ fn every_error_names_place_key_value_and_what_belongs_there() {
         ),
         (
             "name: m\naxes: {}\nsteps:\n  - do: wait\n    seconds: 1\n  - runs:\n    do: measure\n    axis: X\n",
-            "6:5: steps[1].runs = nothing: must be a whole number from",
+            "6:9: steps[1].runs = nothing: must be a whole number from",
         ),
         (
-            "name: m\naxes: {}\nsteps:\n  - {do: measure, axis: Y, runs: 2, sense: CW}\n",
-            "4:43: steps[0].sense = CW: \"CW\" is not known here: must be one of clockwise",
+            "name: m\naxes: {}\nsteps:\n  - {do: measure, axis: X, runs: 2, sense: CW}\n",
+            "4:44: steps[0].sense = CW: \"CW\" is not known here: must be one of clockwise",
         ),
         (
-            "name: m\naxes: {}\nsteps:\n  - {do: measure, axis: Y, runs: 2, beams: [[1, 2], [1, x]]}\n",
+            "name: m\naxes: {}\nsteps:\n  - {do: measure, axis: X, runs: 2, beams: [[1, 2], [1, x]]}\n",
             "4:57: steps[0].beams[1][1] = x: must be a number",
         ),
         (

@@ -7,7 +7,7 @@ use metrology::stamp::{Host, Stamp};
 use serde_json::json;
 
 use super::figures::{self, FIGURE_NAMES, Figures, Reader};
-use super::{HOUR_S, in_words, show_temperatures, temperatures};
+use super::{HOUR_S, in_words, show_temperatures, slips, temperatures};
 use crate::evaluate::budget::{Budget, MandrelGrowth};
 use crate::evaluate::drift::{Drift, DriftLog};
 use crate::evaluate::test_conditions::Thermometers;
@@ -42,11 +42,11 @@ pub(super) fn section(
         .map(|(at, mm)| ((*at - *from).as_secs_f64(), mm - first_mm))
         .collect();
     let recorded_s = (*to - *from).as_secs_f64();
-    section
-        .lines
-        .push(extent(values.len(), recorded_s, log.cause));
+    let extent = extent(values.len(), recorded_s, log.cause);
+    section.lines.push(extent);
     let mandrel = mandrel_of(log.axis, (budget, during), &mut section);
     let found = evaluated(log, &values, (budget, mandrel));
+    section.name_far(&slips::far(&values));
     let beside = temperatures(drift, *from, *to);
     let figures = match found {
         Ok(found) => {
@@ -133,6 +133,9 @@ fn evaluated(
 ) -> Result<Figures, String> {
     if log.zeroed_anew {
         return Err("the instrument was zeroed anew while it went on".to_owned());
+    }
+    if let Some(slip) = slips::slip(values) {
+        return Err(slip);
     }
     let reader = Reader {
         mandrel,

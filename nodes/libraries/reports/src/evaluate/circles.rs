@@ -16,9 +16,10 @@ use metrology::stamp::{Host, Machine, Stamp};
 
 mod turn;
 
+pub(crate) use turn::median;
 use turn::{AtFeed, Tick};
 pub use turn::{EvaluatedTurn, SETTLING_S, TurnBy};
-pub(super) use turn::{FEWEST_SPARSE, SPARSE, median};
+pub(super) use turn::{FEWEST_SPARSE, SPARSE};
 
 /// The command is on the circle when it is this close to it, mm.
 const ON_CIRCLE_MM: f64 = 2e-3;
