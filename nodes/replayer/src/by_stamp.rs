@@ -1,17 +1,20 @@
-//! Messages in the order of what they say, where they came in another.
+//! Axis states and readings in the order in which they were made, where they were recorded in another.
 //!
-//! A recorder writes a message when it comes: one topic may come a second after another, and each a little earlier or later.
-//! What instruments read belongs to where the axes were when it was read, which the stamps say. So axis states and readings
-//! are handed on in the order of their stamps `s`; begins and ends of runs in their own order, none later than it came; and
-//! everything else when it came, at the log time `l`:
+//! A recorder writes a message when it comes, each a little earlier or later. What an instrument read belongs to where the axes
+//! were when it was read, and the stamps of a topic say in which order and how far apart its messages were made. They do not
+//! say it on the recorder's clock: clocks of hosts differ. So the least lateness of a topic is taken for the distance of its
+//! clock, and only what a message was later than that is taken away. With stamp `s` and log time `l`:
 //!
 //! ```text
-//!   k = s                          axis states and readings, where |s - l| <= T    (1)
-//!   k_j = max(k_(j-1), min(s, l))  begins and ends                                 (2)
-//!   k = l                          others, and where |s - l| > T                   (3)
+//!   o = max(s - l)        of a topic                                        (1)
+//!   k = s - o             axis states and readings: never later than l      (2)
+//!   k = l                 all others, and topics whose s - l differ by more than T  (3)
 //! ```
 //!
 //! A message is handed on when none that is still to come can be before it: when one was recorded later than `k + T`.
+//!
+//! # Holds when
+//! One message of a topic came as fast as those of the others: a topic that was late throughout stays so much behind.
 
 use std::collections::BTreeMap;
 
@@ -24,19 +27,22 @@ use crate::reading::stamp_of;
 use crate::stamps::{TOLERANCE_NANOS, nanos_of};
 use crate::turned::Held;
 
-/// What comes first of one instant: a run begins, the axes are somewhere, there is a reading, the run ends.
+/// Most messages that wait: of one instant there may be a whole bag.
+const MOST_HELD: usize = 1_000_000;
+
+/// What comes first of one instant: a run begins, the axes are somewhere, then all else as it came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Rank {
     Begin,
     Axes,
-    Reading,
-    End,
+    Other,
 }
 
 /// Messages that wait for earlier ones.
-#[derive(Default)]
 pub(crate) struct ByStamp {
-    /// By (1) to (3); of equal ones by [`Rank`], then as they came.
+    /// (1) by topic, ns; none of topics that are read by log time.
+    offsets_nanos: BTreeMap<usize, i64>,
+    /// By (2) and (3), of equal ones by [`Rank`], then as they came.
     held: BTreeMap<(i64, Rank, u64), Held>,
     n_taken: u64,
     /// Of the last begin or end.
@@ -44,6 +50,21 @@ pub(crate) struct ByStamp {
 }
 
 impl ByStamp {
+    /// With least and greatest `s - l` of each topic, ns.
+    pub(crate) fn new(offsets_nanos: &BTreeMap<usize, (i64, i64)>) -> Self {
+        let steady = offsets_nanos
+            .iter()
+            .filter_map(|(topic, (least, greatest))| {
+                (greatest.saturating_sub(*least) <= TOLERANCE_NANOS).then_some((*topic, *greatest))
+            });
+        Self {
+            offsets_nanos: steady.collect(),
+            held: BTreeMap::new(),
+            n_taken: 0,
+            segment_nanos: None,
+        }
+    }
+
     /// Takes a message.
     pub(crate) fn take(&mut self, held: Held) {
         let (key, rank) = self.key(&held.message(), held.entry);
@@ -54,8 +75,10 @@ impl ByStamp {
     /// The next message that none can be before, where the last one was recorded at this log time.
     pub(crate) fn due(&mut self, log_time_nanos: u64) -> Option<Held> {
         let log = i64::try_from(log_time_nanos).unwrap_or(i64::MAX);
+        let is_full = self.held.len() > MOST_HELD;
         let first = self.held.first_entry()?;
-        (first.key().0 < log.saturating_sub(TOLERANCE_NANOS)).then(|| first.remove())
+        let is_due = first.key().0 < log.saturating_sub(TOLERANCE_NANOS);
+        (is_due || is_full).then(|| first.remove())
     }
 
     /// The next of those that are left.
@@ -65,34 +88,31 @@ impl ByStamp {
 
     fn key(&mut self, message: &MessageRef<'_>, entry: &Entry) -> (i64, Rank) {
         let log = i64::try_from(message.log_time_nanos).unwrap_or(i64::MAX);
-        let stamp = stamp_of(entry.description.type_name, message.data).map(nanos_of);
-        let near = stamp.filter(|stamp| {
-            stamp.saturating_sub(log).unsigned_abs() <= TOLERANCE_NANOS.unsigned_abs()
-        });
         if entry.name == topics::TEST_SEGMENT.name {
-            let own = near.map_or(log, |stamp| stamp.min(log));
-            let before = self
-                .segment_nanos
-                .replace(own)
-                .filter(|before| *before >= own);
-            let key = before.unwrap_or(own);
-            self.segment_nanos = Some(key);
+            let follows = self.segment_nanos.replace(log) == Some(log);
             let begins = from_cdr::<TestSegment>(message.data).is_ok_and(|segment| segment.begin);
             // A begin at the instant of the end before it is behind that.
-            let is_first = begins && before.is_none();
-            return (key, if is_first { Rank::Begin } else { Rank::End });
+            let is_first = begins && !follows;
+            return (log, if is_first { Rank::Begin } else { Rank::Other });
         }
+        let made = || {
+            let offset = self.offsets_nanos.get(&message.topic.index())?;
+            let stamp = stamp_of(entry.description.type_name, message.data).map(nanos_of)?;
+            // The few soonest of (1) come when they came.
+            let late = log.saturating_sub(stamp.saturating_sub(*offset));
+            (late <= TOLERANCE_NANOS).then(|| log - late.max(0))
+        };
         let read = [
             topics::LENGTH_POSITION.name,
             topics::GRID_POSITION.name,
             topics::ANGLE_POSITION.name,
         ];
         if entry.name == topics::AXES_STATE.name {
-            (near.unwrap_or(log), Rank::Axes)
+            (made().unwrap_or(log), Rank::Axes)
         } else if read.contains(&entry.name) {
-            (near.unwrap_or(log), Rank::Reading)
+            (made().unwrap_or(log), Rank::Other)
         } else {
-            (log, Rank::Reading)
+            (log, Rank::Other)
         }
     }
 }

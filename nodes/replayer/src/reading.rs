@@ -72,18 +72,17 @@ pub struct Taken<'a> {
 /// and outliers of thermometers (`outliers`) are left out and counted. A begin of a run before the end of the last one at one log
 /// time is handed on behind it (`turned`).
 pub fn read(bag: &Bag, order: Order, wanted: &[&str], take: impl FnMut(Taken<'_>)) -> Reading {
-    read_through(bag, (order, None), wanted, take)
+    read_through(bag, (order, false), wanted, take)
 }
 
-/// The same by log time, where axis states and readings of instruments come in the order of their stamps (`by_stamp`).
+/// The same by log time, where axis states and readings of instruments come in the order in which they were made (`by_stamp`).
 pub fn read_by_stamp(bag: &Bag, wanted: &[&str], take: impl FnMut(Taken<'_>)) -> Reading {
-    let by_stamp = Some(ByStamp::default());
-    read_through(bag, (Order::LogTime, by_stamp), wanted, take)
+    read_through(bag, (Order::LogTime, true), wanted, take)
 }
 
 fn read_through(
     bag: &Bag,
-    (order, by_stamp): (Order, Option<ByStamp>),
+    (order, is_by_stamp): (Order, bool),
     wanted: &[&str],
     take: impl FnMut(Taken<'_>),
 ) -> Reading {
@@ -101,6 +100,7 @@ fn read_through(
     } else {
         WrongStamps::default()
     };
+    let by_stamp = is_by_stamp.then(|| ByStamp::new(wrong_stamps.offsets_nanos()));
     let mut reader = Reader {
         rows,
         wrong_stamps,

@@ -71,6 +71,8 @@ pub(crate) struct WrongStamps {
     outliers: BTreeMap<Key, Outlier>,
     /// The topics that are of another clock.
     other_clocks: BTreeMap<usize, OtherClock>,
+    /// Least and greatest offset (1) of each topic's clock, ns.
+    offsets_nanos: BTreeMap<usize, (i64, i64)>,
 }
 
 /// Successive messages of a topic whose stamps go on with its log times (2).
@@ -167,6 +169,53 @@ struct TopicStamps {
     topic: usize,
     entry: &'static Entry,
     groups: Vec<Group>,
+    fastest: Fastest,
+}
+
+impl TopicStamps {
+    /// Its number with least and greatest offset (1) of its clock, ns.
+    fn offsets_nanos(&self) -> Option<(usize, (i64, i64))> {
+        let firm = || self.groups.iter().filter(|group| group.is_firm);
+        let least = firm().map(|group| group.offsets.0).min()?;
+        let greatest = firm().map(|group| group.offsets.1).max()?;
+        let fastest = self.fastest.offset_nanos()?;
+        Some((self.topic, (least, fastest.min(greatest))))
+    }
+}
+
+/// The greatest offsets (1) of a topic: those of the messages that were recorded soonest.
+#[derive(Debug, Default)]
+struct Fastest {
+    /// Greatest first, ns.
+    offsets_nanos: Vec<i64>,
+    messages: u64,
+}
+
+impl Fastest {
+    /// Offsets that are kept: stamps of so few messages may be ahead.
+    const KEPT: usize = 8;
+    /// Messages for each of them from which on the last one counts.
+    const MESSAGES_EACH: u64 = 100;
+
+    fn take(&mut self, offset_nanos: i64) {
+        self.messages += 1;
+        let place = self.offsets_nanos.partition_point(|it| *it > offset_nanos);
+        if place < Self::KEPT {
+            self.offsets_nanos.insert(place, offset_nanos);
+            self.offsets_nanos.truncate(Self::KEPT);
+        }
+    }
+
+    /// The least lateness of a topic, as the offset of its clock, ns; of a long one without its few soonest messages.
+    fn offset_nanos(&self) -> Option<i64> {
+        let is_long = self.messages >= Self::MESSAGES_EACH * Self::KEPT as u64;
+        let counts = if is_long {
+            self.offsets_nanos.last()
+        } else {
+            self.offsets_nanos.first()
+        };
+        counts.copied()
+    }
 }
 
 /// Times of the clock that most messages of a bag have.
@@ -216,6 +265,10 @@ impl WrongStamps {
             };
         };
         let other_clocks = clocks::others(&topics);
+        let offsets_nanos = topics
+            .iter()
+            .filter_map(TopicStamps::offsets_nanos)
+            .collect();
         let wrong: BTreeMap<usize, Vec<(Group, Limits)>> = topics
             .iter()
             .map(|topic| (topic.topic, judge(topic, times, &strays)))
@@ -225,7 +278,13 @@ impl WrongStamps {
             found: Self::found(bag, &entries, &wrong),
             outliers,
             other_clocks,
+            offsets_nanos,
         }
+    }
+
+    /// Least and greatest offset (1) of each topic's clock, ns.
+    pub(crate) const fn offsets_nanos(&self) -> &BTreeMap<usize, (i64, i64)> {
+        &self.offsets_nanos
     }
 
     /// The messages of the groups that do not fit.
@@ -317,7 +376,8 @@ type Found = (Vec<TopicStamps>, BTreeSet<u64>, BTreeMap<Key, Outlier>);
 fn read(bag: &Bag, entries: &[Option<&'static Entry>]) -> Found {
     let mut thermometers: BTreeMap<usize, Course<Key>> = BTreeMap::new();
     let mut outliers = BTreeMap::new();
-    let mut groups: Vec<Vec<Group>> = entries.iter().map(|_| Vec::new()).collect();
+    let mut groups: Vec<(Vec<Group>, Fastest)> =
+        entries.iter().map(|_| Default::default()).collect();
     let mut messages = bag.messages(Order::File);
     let mut number = 0_u64;
     let times = std::iter::from_fn(|| {
@@ -334,7 +394,8 @@ fn read(bag: &Bag, entries: &[Option<&'static Entry>]) -> Found {
                     outliers.extend(course.take(key, degc));
                 }
                 let log = i64::try_from(log_nanos).unwrap_or(i64::MAX);
-                let of_topic = &mut groups[topic];
+                let (of_topic, fastest) = &mut groups[topic];
+                fastest.take(stamp.saturating_sub(log));
                 if !of_topic.last_mut().is_some_and(|it| it.take(stamp, log)) {
                     of_topic.push(Group::new(at, stamp, log));
                 }
@@ -345,11 +406,12 @@ fn read(bag: &Bag, entries: &[Option<&'static Entry>]) -> Found {
     let strays = leap::strays_of(times, 0);
     outliers.extend(thermometers.into_values().flat_map(Course::end));
     let topics = groups.into_iter().zip(entries).enumerate();
-    let topics = topics.filter_map(|(topic, (groups, entry))| {
+    let topics = topics.filter_map(|(topic, ((groups, fastest), entry))| {
         Some(TopicStamps {
             topic,
             entry: (*entry)?,
             groups,
+            fastest,
         })
     });
     (topics.collect(), strays, outliers)
