@@ -46,6 +46,10 @@ impl Meetings {
                         let gone = guid.to_bytes();
                         met().retain(|(_, reader)| *reader != gone);
                     }
+                    // Of a client that was killed or is cut off nothing else is said.
+                    DomainParticipantStatusEvent::ParticipantLost { id, .. } => {
+                        met().retain(|(_, reader)| reader[..PREFIX_LEN] != *id.as_ref());
+                    }
                     DomainParticipantStatusEvent::RemoteWriterMatched {
                         local_reader,
                         remote_writer,

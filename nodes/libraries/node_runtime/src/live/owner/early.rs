@@ -17,6 +17,8 @@ use crate::node::Bytes;
 const READER_TIMEOUT: Duration = Duration::from_secs(1);
 /// Between looks for readers while requests wait.
 pub(super) const POLL: Duration = Duration::from_millis(5);
+/// Requests that wait at most: further ones are taken at once.
+const MOST_EARLY: usize = 256;
 /// Clients that are remembered.
 const MOST_CLIENTS: usize = 1_024;
 
@@ -54,7 +56,9 @@ impl Hearing {
 impl Owner {
     /// Takes a request now, or keeps it until its client hears the answer.
     pub(super) fn request_of(&mut self, server: usize, client: &Guid, to: ReplyTo, bytes: Bytes) {
-        if !self.hearing.is_behind(server, client) && self.is_heard(server, client) {
+        let is_full = self.hearing.early.len() >= MOST_EARLY;
+        let is_next = !self.hearing.is_behind(server, client) && self.is_heard(server, client);
+        if is_next || is_full {
             self.request(server, to, &bytes);
             return;
         }
