@@ -4,14 +4,14 @@ use std::ops::Range;
 
 use machine::MachineFile;
 use metrology::sample::TestKind;
-use metrology::stamp::{Host, Span, Stamp};
+use metrology::stamp::{Host, Stamp};
 use metrology::{Axis, PerAxis};
 use nalgebra::Vector3;
 use twin::simulate::plate_axes;
 use twin::{Channel, Motion};
 
 use super::account::{Account, Reason};
-use super::record::{Record, STANDING_S};
+use super::record::{Record, STANDING_S, stands};
 use super::select::FULL_RATE;
 use super::standing::{Standing, both, standing};
 use super::thermometers;
@@ -268,10 +268,16 @@ impl Scope<'_> {
             return Err(Reason::InGap);
         }
         if self.motion.axes.iter().any(|axis| bow(axis) > BOW) {
-            let before = k
-                .checked_sub(1)
-                .map(|before| ticks[k].at - ticks[before].at);
-            let usual_s = before.map_or(0.0, Span::as_secs_f64).max(STANDING_S);
+            let before = k.checked_sub(1).map(|before| &ticks[before]);
+            // Of axes that stood only some ticks are kept.
+            let usual_s = before.map_or(0.0, |before| {
+                let step_s = (ticks[k].at - before.at).as_secs_f64();
+                if stands(before, &ticks[k]) {
+                    step_s.max(STANDING_S)
+                } else {
+                    step_s
+                }
+            });
             return Err(if dt_s < FULL_RATE * usual_s {
                 Reason::TooUneven
             } else {

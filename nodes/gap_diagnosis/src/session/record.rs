@@ -288,7 +288,8 @@ fn of<T: Clone>(recent: &VecDeque<T>, is_in: impl Fn(&T) -> bool) -> Vec<T> {
     recent.iter().filter(|one| is_in(one)).cloned().collect()
 }
 
-fn stands(a: &Tick, b: &Tick) -> bool {
+/// Whether the command is the same at two ticks.
+pub(super) fn stands(a: &Tick, b: &Tick) -> bool {
     let pairs = a.commanded.0.iter().zip(&b.commanded.0);
     pairs.into_iter().all(|(a, b)| (a - b).abs() < STANDSTILL)
 }
