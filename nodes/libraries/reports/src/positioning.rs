@@ -136,7 +136,7 @@ fn section(tests: &Tests, test: &LinearTest, budget: Option<&Budget>) -> Result<
             let why = too_short(test).or_else(|| without_places(tests, test));
             let why = why.or_else(|| without_readings(test));
             let why = why.unwrap_or_else(|| error.to_string());
-            if nothing_was_read(test) {
+            if test.targets_mm.is_empty() {
                 section.without_figures(why);
             } else {
                 section.not_evaluated(why);

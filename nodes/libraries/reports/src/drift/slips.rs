@@ -1,23 +1,25 @@
 //! Single readings of a displacement log that are far from those beside them.
 //!
-//! As at the stops of a positioning test: a reading half a millimetre from both beside it is none of a machine, and takes the
-//! figures of its log away; one that is far from both and may be the machine's counts and is named.
+//! As at the stops of a positioning test: a reading half a millimetre from those about it is none of a machine, and takes the
+//! figures of its log away; one that is far from them and may be the machine's counts and is named.
 
 use metrology::number::number;
 
 use crate::evaluate::circles::median;
 
-/// Further from both readings beside it none is that counts, mm.
+/// Further from the middle of those about it none is that counts, mm.
 const SLIP_MM: f64 = 0.5;
 /// As many times the usual step, and this far, mm, is far.
 const FAR_STEPS: f64 = 20.0;
 const LEAST_FAR_MM: f64 = 0.005;
+/// Readings on each side that a reading is held against.
+const ABOUT: usize = 4;
 /// Fewer readings have no usual step.
 const LEAST_READINGS: usize = 10;
 
 /// Why a log has no figure; none where no reading is a slip. Values: s from the begin, mm.
 pub(super) fn slip(values: &[(f64, f64)]) -> Option<String> {
-    let (place, off_mm) = leaps(values).find(|(_, off_mm)| *off_mm > SLIP_MM)?;
+    let (place, off_mm) = from_middle(values).find(|(_, off_mm)| *off_mm > SLIP_MM)?;
     let (at_s, mm) = values[place];
     Some(format!(
         "reading {} of {}, {} s after the first, is {} mm, {} mm from those beside it, at most {SLIP_MM} mm: mend the reading or repeat the log",
@@ -59,6 +61,16 @@ fn leaps(values: &[(f64, f64)]) -> impl Iterator<Item = (usize, f64)> {
     })
 }
 
+/// How far each reading is from the middle of those about it, mm.
+fn from_middle(values: &[(f64, f64)]) -> impl Iterator<Item = (usize, f64)> {
+    (0..values.len()).filter_map(|place| {
+        let from = place.saturating_sub(ABOUT);
+        let about = values.iter().enumerate().skip(from).take(2 * ABOUT + 1);
+        let others = about.filter(|(k, _)| *k != place).map(|(_, (_, mm))| *mm);
+        Some((place, (values[place].1 - median(others)?).abs()))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -82,6 +94,15 @@ mod tests {
             said.starts_with("reading 121 of 240, 7200 s after the first, is 9.999 mm"),
             "{said}"
         );
+        // An instrument beyond its range, and the last reading.
+        let mut beyond = log();
+        beyond[100..103]
+            .iter_mut()
+            .for_each(|value| value.1 = 9.999);
+        assert!(slip(&beyond).unwrap().starts_with("reading 101 of 240"));
+        let mut last = log();
+        last[239].1 = 0.9;
+        assert!(slip(&last).unwrap().starts_with("reading 240 of 240"));
         values[120].1 = 0.090;
         assert_eq!(slip(&values), None);
         let said = far(&values);

@@ -257,7 +257,9 @@ fn evaluated(
         probing::ring(&flat, &artefact, drift_mm)
     };
     let form_mm = |points: &[Vector3<f64>]| of(points).ok().map(|one| one.form_error.value_mm);
-    let slip = slip(&points, form_mm);
+    // A centre and a radius.
+    let n_unknowns = if is_sphere { 4 } else { 3 };
+    let slip = slip(&points, n_unknowns, form_mm);
     let (why, result) = match (of(&points), &slip) {
         (Ok(_), Some(why)) => (Some(why.clone()), None),
         (Ok(result), None) => (None, Some(result)),
@@ -290,9 +292,19 @@ fn evaluated(
 /// Why touches are not those of one shape: the one without which the others are nearest to it.
 fn slip(
     points: &[Vector3<f64>],
+    n_unknowns: usize,
     form_mm: impl Fn(&[Vector3<f64>]) -> Option<f64>,
 ) -> Option<String> {
     let found_mm = form_mm(points).filter(|mm| *mm > GREATEST_FORM_MM)?;
+    let greatest = um(GREATEST_FORM_MM);
+    if points.len() < n_unknowns + 3 {
+        // Without any of so few the others fit nearly as well.
+        return Some(format!(
+            "form error of {} µm, at most {greatest} µm: one of its {} touches is of something else: repeat the measurement",
+            um(found_mm),
+            points.len()
+        ));
+    }
     let without = |out: usize| {
         let mut others = points.to_vec();
         others.remove(out);
@@ -305,7 +317,7 @@ fn slip(
         "form error of {} µm, at most {} µm: touch {} of {}, at ({}) mm, is the farthest from the others, which have {} µm without it: \
          repeat the measurement",
         um(found_mm),
-        um(GREATEST_FORM_MM),
+        greatest,
         place + 1,
         points.len(),
         at.collect::<Vec<_>>().join(", "),
@@ -497,9 +509,11 @@ environmental_drift_um: 0.6
             Some(radii.clone().fold(0.0, f64::max) - radii.fold(f64::INFINITY, f64::min))
         };
         let mut points: Vec<Vector3<f64>> = (0..25).map(sphere).collect();
-        assert_eq!(slip(&points, form_mm), None);
+        assert_eq!(slip(&points, 4, form_mm), None);
         points[17].x = 0.0;
-        let said = slip(&points, form_mm).unwrap();
+        let few = slip(&points[14..20], 4, form_mm).unwrap();
+        assert!(few.contains("one of its 6 touches"), "{few}");
+        let said = slip(&points, 4, form_mm).unwrap();
         assert!(said.contains("touch 18 of 25, at (0, "), "{said}");
     }
 }

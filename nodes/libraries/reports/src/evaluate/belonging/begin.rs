@@ -4,6 +4,7 @@ use std::fmt::Debug;
 
 use metrology::number::number;
 use metrology::sample::{FARTHEST_FROM_NOMINAL, Sense, TestKind, TestPlane, TestSegment};
+use nalgebra::Vector3;
 
 /// Lengths of begin and end that differ by less are one, mm and mm/s.
 const SAME_NUMBER: f64 = 1e-6;
@@ -69,49 +70,42 @@ pub(super) fn contradiction(begin: &TestSegment, end: &TestSegment) -> Option<St
         .map(|(name, first, last)| in_words(name, &first, &last))
         .or_else(|| {
             // Its number is 0, as that of a kind that is not stated.
-            let is_stated = end.kind != TestKind::Latency || states_all(end);
+            let is_stated = end.kind != TestKind::Latency || states_circle(end);
             (is_stated && end.kind != begin.kind).then(|| in_words("kind", &begin.kind, &end.kind))
         })
-        .or_else(|| states_all(end).then(|| of_whole(begin, end)).flatten())
+        .or_else(|| of_whole(begin, end))
 }
 
-/// Whether an end repeats what its begin stated: the numbers of its test are there.
-fn states_all(end: &TestSegment) -> bool {
-    end.radius_mm.abs() > SAME_NUMBER || end.feed_mm_s.abs() > SAME_NUMBER
+/// Whether an end states what a circle has alone: then its kind is stated as well.
+fn states_circle(end: &TestSegment) -> bool {
+    end.radius_mm.abs() > SAME_NUMBER && end.plane != TestPlane::None
 }
 
-/// The other fields, of an end that states them all.
+/// The other fields; one that is zero is not stated.
 fn of_whole(begin: &TestSegment, end: &TestSegment) -> Option<String> {
-    let in_m = |segment: &TestSegment| {
-        let both = [segment.centre_mm, segment.tool_offset_mm];
-        both.map(|mm| {
-            mm.iter()
-                .map(|mm| number(mm * 1e-3))
-                .collect::<Vec<_>>()
-                .join(" ")
-        })
-    };
-    let ([centre, offset], [end_centre, end_offset]) = (in_m(begin), in_m(end));
-    let fields = [
-        ("centre", centre, end_centre),
-        ("tool_offset", offset, end_offset),
-        (
-            "stations",
-            begin.stations.to_string(),
-            end.stations.to_string(),
-        ),
-        (
-            "zero_id",
-            begin.zero_id.to_string(),
-            end.zero_id.to_string(),
-        ),
-        (
-            "setup_id",
-            begin.setup_id.to_string(),
-            end.setup_id.to_string(),
-        ),
+    let places = [
+        ("centre", begin.centre_mm, end.centre_mm),
+        ("tool_offset", begin.tool_offset_mm, end.tool_offset_mm),
     ];
-    let differs = fields.into_iter().find(|(_, first, last)| first != last);
+    let in_m = |mm: Vector3<f64>| {
+        let all = mm.iter().map(|mm| number(mm * 1e-3));
+        all.collect::<Vec<_>>().join(" ")
+    };
+    let is_other = |first: Vector3<f64>, last: Vector3<f64>| {
+        last.amax() > SAME_NUMBER && (last - first).amax() > SAME_NUMBER
+    };
+    let mut places = places.into_iter();
+    let place = places.find(|(_, first, last)| is_other(*first, *last));
+    let numbers = [
+        ("stations", begin.stations, end.stations),
+        ("zero_id", begin.zero_id, end.zero_id),
+        ("setup_id", begin.setup_id, end.setup_id),
+    ];
+    let mut numbers = numbers.into_iter();
+    let other = numbers.find(|(_, first, last)| *last != 0 && first != last);
+    let place = place.map(|(name, first, last)| (name, in_m(first), in_m(last)));
+    let other = other.map(|(name, first, last)| (name, first.to_string(), last.to_string()));
+    let differs = place.or(other);
     differs
         .map(|(name, first, last)| format!("{name} = {first} at its begin and {last} at its end"))
 }
