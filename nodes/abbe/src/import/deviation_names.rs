@@ -22,6 +22,7 @@ const DEVIATION: &[&str] = &[
     "error",
     "errors",
     "abw",
+    "posabw",
     "abweichung",
     "abweichungen",
     "fehler",
@@ -41,6 +42,10 @@ const JOINED: &[&str] = &[
     "gesamt",
     "lage",
     "laser",
+    "mess",
+    "linear",
+    "weg",
+    "pos",
     "achs",
     "achsen",
     "x",
@@ -90,7 +95,15 @@ const HARMLESS: &[&str] = &[
     "messung",
     "reihe",
     "column",
+    "vom",
+    "von",
+    "zu",
+    "zum",
     // The quantity itself.
+    "set",
+    "setpoint",
+    "sollposition",
+    "comp",
     "position",
     "positional",
     "positioning",
@@ -112,6 +125,7 @@ const HARMLESS: &[&str] = &[
     "sollwert",
     "ist",
     "istwert",
+    "messwert",
     "measured",
     "measurement",
     "meas",
@@ -207,6 +221,9 @@ pub fn doubt(name: &str) -> Option<String> {
     if let Some(minus) = first.filter(|first| ['-', '\u{2212}', '\u{2013}', '±'].contains(first)) {
         return Some(minus.to_string());
     }
+    if words(name).first().is_some_and(|first| first == "minus") {
+        return Some("minus".to_owned());
+    }
     if let Some(mark) = name.chars().find(|letter| SCALING_MARKS.contains(letter)) {
         return Some(mark.to_string());
     }
@@ -236,9 +253,44 @@ pub fn doubt(name: &str) -> Option<String> {
     {
         return Some(format!("{first}, {second}"));
     }
+    if let Some(odd) = odd_number(&every).or_else(|| two_axes(&every)) {
+        return Some(odd);
+    }
     let is_unit = |word: &String| unit.as_ref().is_some_and(|unit| words(unit).contains(word));
     all.into_iter()
         .find(|word| !is_known(word) && !is_unit(word))
+}
+
+/// `Error No.` without what is numbered, and `x 2`, `x 0.1`.
+fn odd_number(words: &[String]) -> Option<String> {
+    // `X 2` is the second run of X.
+    let is_factor = |word: &String| word.parse::<u32>().is_ok_and(|n| n == 0 || n >= 10);
+    let is_times = |two: &[String]| two[0] == "x" && is_factor(&two[1]);
+    if words.windows(2).any(is_times) {
+        return Some("x".to_owned());
+    }
+    const NUMBERED: [&str; 10] = [
+        "run", "cycle", "test", "series", "lauf", "zyklus", "messung", "reihe", "point", "punkt",
+    ];
+    let number = words
+        .iter()
+        .find(|word| matches!(word.as_str(), "no" | "nr"))?;
+    let is_of = |word: &String| NUMBERED.contains(&word.as_str());
+    // `no compensation`, `Error no comp`.
+    let is_denial = words
+        .iter()
+        .any(|word| word.starts_with("comp") || word.starts_with("corr"));
+    (!is_denial && !words.iter().any(is_of)).then(|| number.clone())
+}
+
+/// Two letters of axes: a difference of axes, or a deviation across.
+fn two_axes(words: &[String]) -> Option<String> {
+    let mut axes = words
+        .iter()
+        .filter(|word| word.len() == 1 && axis_of(word).is_some());
+    let first = axes.next()?;
+    let second = axes.find(|other| *other != first)?;
+    Some(format!("{first}, {second}"))
 }
 
 fn is_known(word: &str) -> bool {
@@ -270,9 +322,12 @@ fn is_factor(word: &str) -> bool {
     matches!(word, "10" | "100" | "1000" | "10000")
 }
 
-/// `x10`: times ten, and no axis of that number.
+/// `x10`: times ten, and no axis of that number; `x1` is the first run of X.
 fn is_times(word: &str) -> bool {
-    word.strip_prefix('x').is_some_and(is_factor)
+    let number = word
+        .strip_prefix('x')
+        .and_then(|number| number.parse::<u32>().ok());
+    number.is_some_and(|number| number >= 10)
 }
 
 /// The columns of a table, where beside targets or angles only those hold deviations whose names say nothing else.
@@ -351,6 +406,17 @@ mod tests {
             "deviation [1] um",
             "Fehler ohne Korrektur",
             "measured - target difference",
+            "Abw. [um]",
+            "Abw. X-Achse",
+            "Pos.-Abw. [um]",
+            "Abweichung vom Sollwert",
+            "Abweichung zum Soll",
+            "Deviation from set point",
+            "Messabweichung",
+            "Linearabweichung",
+            "Posfehler",
+            "Error no comp",
+            "error run no 1",
         ] {
             assert_eq!(doubt(name), None, "{name}");
         }
@@ -366,7 +432,7 @@ mod tests {
             "backlash error;lost motion error;following error;contouring error;servo error;Schleppfehler",
             "Fehlernummer;error flag;error code;deviation sum;cumulative error;incremental error",
             "diff to previous;-error um;\u{2212}error um;neg. error;inverted error;1/error;error (um)/2",
-            "half error;error*10;error x10;deviation x 1000 mm;Deviation mm (um);EYX error um;Lateral deviation um",
+            "half error;error*10;error x10;deviation x 1000 mm;minus error [um];Error x 0.1 um;Fehler Nr;Error No. [um];diff x-y um;Deviation mm (um);EYX error um;Lateral deviation um",
             "vertical deviation um;horizontal deviation um;normal deviation um;cross deviation um",
             "median error;worst error;allowed error",
         ];

@@ -46,12 +46,9 @@ const OF_A_TEST: &[&str] = &[
     "messgröße",
     "messgroesse",
     "grandeur",
-    "type",
-    "typ",
-    "kind",
 ];
 /// Other words of such names, whole but for digits at their ends.
-const WHOLE: &[&str] = &["line", "place", "height"];
+const WHOLE: &[&str] = &["line", "place", "height", "type", "typ", "kind"];
 /// First words of such names.
 const WORDS_OF_A_TEST: &[&str] = &["x", "y", "z", "a", "b", "c", "comp", "day", "tag"];
 /// Parts of names of temperatures, humidities and pressures, and units of them. One reading for each run parts no tests.
@@ -113,11 +110,6 @@ const MARKS: &[&str] = &[
     "masked",
     "valide",
     "valable",
-    "bewertung",
-    "beurteilung",
-    "rating",
-    "assessment",
-    "verdict",
 ];
 /// Words before them that say nothing.
 const BEFORE_MARKS: &[&str] = &["is", "row", "point", "data", "reading", "to", "be", "not"];
@@ -149,6 +141,10 @@ const MARKING: &[&str] = &[
     "discarded",
     "ausreißer",
     "ungültig",
+];
+/// Words of a note with which it marks nothing (`no outlier`).
+const DENYING: &[&str] = &[
+    "no", "not", "nothing", "none", "kein", "keine", "nicht", "nichts",
 ];
 /// Those whose numbers are codes.
 const CODES: &[&str] = &[
@@ -234,10 +230,13 @@ fn noted(name: &str, cells: &[Cell<'_>]) -> Result<()> {
     let is_marking = |text: &str| {
         let is_sign = |letter: char| !letter.is_alphanumeric() && !matches!(letter, '-' | '.');
         let lower = text.to_lowercase();
-        let is_word = |word: &str| word.len() > 1 && MARKING.contains(&word);
-        let mut words = lower.split(|letter: char| !letter.is_alphanumeric());
+        let words: Vec<&str> = lower
+            .split(|letter: char| !letter.is_alphanumeric())
+            .collect();
+        let is_denied = words.iter().any(|word| DENYING.contains(word));
+        let is_word = |word: &&str| word.len() > 1 && MARKING.contains(word);
         MARKING.contains(&lower.as_str())
-            || words.any(is_word)
+            || (!is_denied && words.iter().any(is_word))
             || (!text.is_empty() && text.chars().all(is_sign))
     };
     // A letter beside other letters is the name of an axis.

@@ -312,6 +312,7 @@ impl<'t> Text<'t> {
                 self.unit(read, deviation, likely_deviation(&[read], deviation))?;
             }
             (None, Some(read)) => {
+                across::check_measured(found, read)?;
                 self.read(key("measured_mm", "measured_deg"), read);
                 let likely = likely_target(read, place);
                 self.unit(read, place, likely)?;

@@ -17,7 +17,7 @@ const ROLE_WORDS: [(Role, &[&str], &[&str]); 9] = [
     (
         Role::Deviation,
         &["dev", "err", "abweich", "fehler", "diff", "delta"],
-        &[],
+        &["abw", "posabw"],
     ),
     (
         Role::Measured,

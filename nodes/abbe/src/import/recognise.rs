@@ -15,7 +15,7 @@ use super::table::number_of;
 use super::times;
 use super::units::{Kind, Unit};
 use super::unread;
-use super::vocabulary::{is_correction, is_reversed, words};
+use super::vocabulary::{is_correction, is_difference, is_reversed, words};
 
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -352,6 +352,9 @@ fn role(
     }
     if !is_numeric || is_correction(name) || is_reversed(name) {
         return None;
+    }
+    if is_difference(name) {
+        return Some(Role::Deviation);
     }
     if let Some(pass) = pass_names::of(name) {
         return Some(Role::Pass(pass.direction));

@@ -425,9 +425,24 @@ pub fn is_correction(name: &str) -> bool {
     (0..words.len()).any(|k| is_one(&words[k]) && !is_under(k))
 }
 
+/// Whether the measured position comes first in a name and the target is taken from it (`Ist-Soll`, `actual - nominal`): a
+/// deviation.
+pub fn is_difference(name: &str) -> bool {
+    has_minus_between(name, OF_MEASURED, OF_TARGETS)
+}
+
 /// Whether the target comes first in a name and the measured position is taken from it (`Soll-Ist`,
 /// `target - measured`): the negative of a deviation.
 pub fn is_reversed(name: &str) -> bool {
+    has_minus_between(name, OF_TARGETS, OF_MEASURED)
+}
+
+/// Begins of words of targets, and of measured positions.
+const OF_TARGETS: &[&str] = &["target", "soll", "nominal", "command", "ziel"];
+const OF_MEASURED: &[&str] = &["measur", "actual", "ist", "reading", "laser", "messwert"];
+
+/// Whether a word of the first kind, a minus and a word of the second kind follow one another.
+fn has_minus_between(name: &str, first: &[&str], second: &[&str]) -> bool {
     let lower = name.to_lowercase().replace(['\u{2212}', '\u{2013}'], "-");
     let lower = lower.replace(" minus ", " - ");
     let mut sides = lower.split('-').peekable();
@@ -436,16 +451,7 @@ pub fn is_reversed(name: &str) -> bool {
         let begins = |word: Option<&String>, all: &[&str]| {
             word.is_some_and(|word| all.iter().any(|begin| word.starts_with(begin)))
         };
-        let is_target = begins(
-            left.last(),
-            &["target", "soll", "nominal", "command", "ziel"],
-        );
-        if is_target
-            && begins(
-                right.first(),
-                &["measur", "actual", "ist", "reading", "laser"],
-            )
-        {
+        if begins(left.last(), first) && begins(right.first(), second) {
             return true;
         }
     }
@@ -496,6 +502,16 @@ mod tests {
         }
         for name in ["measured - target", "Ist-Soll", "target", "Soll", "x-y", ""] {
             assert!(!is_reversed(name), "{name}");
+        }
+        for name in [
+            "Ist-Soll [um]",
+            "Actual - Nominal [um]",
+            "measured-target [um]",
+            "Messwert-Sollwert [um]",
+            "Reading - target [um]",
+            "Laser\u{2212}Nominal (um)",
+        ] {
+            assert!(super::is_difference(name) && !is_reversed(name), "{name}");
         }
     }
 

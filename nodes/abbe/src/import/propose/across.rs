@@ -4,6 +4,7 @@ use anyhow::{Result, bail};
 use metrology::Axis;
 
 use super::super::recognise::{Known, Recognised, Role};
+use super::super::units::Unit;
 
 /// Refuses deviations of another axis than that of the targets.
 ///
@@ -38,12 +39,7 @@ pub fn check_positions(found: &Recognised, columns: &[&Known]) -> Result<()> {
         return Ok(());
     };
     let targets = &target.numbers;
-    let ends = targets
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], one| {
-            [low.min(*one), high.max(*one)]
-        });
-    let range = ends[1] - ends[0];
+    let range = range(targets);
     let are_same = |column: &&&Known| {
         let pairs = || targets.iter().zip(&column.numbers);
         column.numbers.len() == targets.len()
@@ -61,6 +57,47 @@ pub fn check_positions(found: &Recognised, columns: &[&Known]) -> Result<()> {
         ),
         None => Ok(()),
     }
+}
+
+/// Measured positions are closer to their targets than this share of the targets' range.
+const NEAR_SHARE: f64 = 0.1;
+
+/// Refuses columns of measured positions that are far from the targets of their rows: deviations, or of another unit.
+///
+/// # Errors
+/// With both names and the remedy.
+pub fn check_measured(found: &Recognised, read: &Known) -> Result<()> {
+    let Some(target) = found.first(Role::Target) else {
+        return Ok(());
+    };
+    let size = |column: &Known| column.unit.map_or(1.0, Unit::size);
+    let is_stated = target.unit.is_some() == read.unit.is_some();
+    let (of_target, of_read) = (size(target), size(read));
+    let range = range(&target.numbers) * of_target;
+    let mut pairs = target.numbers.iter().zip(&read.numbers);
+    let far = |(target, number): (&f64, &f64)| {
+        (number * of_read - target * of_target).abs() > NEAR_SHARE * range
+    };
+    let is_same = read.numbers.len() == target.numbers.len() && is_stated && range > 0.0;
+    if is_same && pairs.any(far) {
+        bail!(
+            "column \"{}\": its numbers are not near those of \"{}\": measured positions are; where they are deviations name the column \
+             as deviation_um in a map",
+            read.name,
+            target.name
+        );
+    }
+    Ok(())
+}
+
+/// Greatest less least.
+fn range(numbers: &[f64]) -> f64 {
+    let ends = numbers
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], one| {
+            [low.min(*one), high.max(*one)]
+        });
+    ends[1] - ends[0]
 }
 
 /// The one axis whose letter stands in a name.
