@@ -55,7 +55,7 @@ impl fmt::Display for BrokenOff {
     }
 }
 
-/// Judges what comes while a bag is read in the order of its log times.
+/// Judges what comes while a bag is read.
 #[derive(Debug, Default)]
 pub(super) struct Belonging {
     open: Option<Open>,
