@@ -25,6 +25,10 @@ pub(super) struct Figures {
     pub after_1_h: Option<ExpandedLength>,
     /// Drift after three hours; `None`: not recorded so long.
     pub after_3_h: Option<ExpandedLength>,
+    /// Drift at the end of the test.
+    pub at_end: ExpandedLength,
+    /// Greatest minus least displacement of the last hour; `None`: not recorded so long.
+    pub range_last_hour: Option<ExpandedLength>,
     /// Greatest minus least displacement of the whole test.
     pub range: ExpandedLength,
     /// Slope of the line through the end of the test.
@@ -105,10 +109,11 @@ pub(super) fn of(
     let times_s: Vec<f64> = values.iter().map(|(time_s, _)| *time_s).collect();
     let recorded_s = times_s.last().copied().unwrap_or(0.0);
     let rate_window_s = rate_window_s(&times_s);
-    let evaluated = |drift_after_s: f64| {
+    let evaluated_part = |values: &[(f64, f64)], (drift_after_s, rate_window_s): (f64, f64)| {
+        let first_s = values.first().map_or(0.0, |(time_s, _)| *time_s);
         let test = DriftTest {
             cause,
-            times_s: times_s.clone(),
+            times_s: values.iter().map(|(time_s, _)| time_s - first_s).collect(),
             channels: vec![DriftChannel {
                 axis,
                 height_mm: 0.0,
@@ -126,7 +131,15 @@ pub(super) fn of(
             least: 1,
         })
     };
+    let evaluated = |drift_after_s: f64| evaluated_part(values, (drift_after_s, rate_window_s));
     let whole = evaluated(recorded_s.max(f64::MIN_POSITIVE))?;
+    let last_hour = times_s.partition_point(|time_s| *time_s < recorded_s - HOUR_S);
+    let last_hour = values.get(last_hour..).unwrap_or_default();
+    let has_last_hour = recorded_s >= HOUR_S && last_hour.len() >= LEAST_OF_RATE;
+    let last_s = last_hour
+        .first()
+        .map_or(0.0, |(time_s, _)| recorded_s - time_s);
+    let last_hour = has_last_hour.then(|| evaluated_part(last_hour, (last_s, last_s)));
     let after = |hours: f64| {
         let reaches = recorded_s >= hours * HOUR_S;
         let found = reaches.then(|| evaluated(hours * HOUR_S));
@@ -136,6 +149,8 @@ pub(super) fn of(
     Ok(Figures {
         after_1_h: after(one)?,
         after_3_h: after(three)?,
+        at_end: whole.drift_after,
+        range_last_hour: last_hour.transpose()?.map(|one| one.range),
         range: whole.range,
         final_rate: whole.final_rate,
         rate_window_s,
@@ -157,6 +172,18 @@ impl Figures {
             figure(&self.range, stated),
             rate_cell(self.final_rate, stated),
         ]
+    }
+}
+
+impl Figures {
+    /// Drift at the end, and range of the last hour, in a sentence.
+    pub(super) fn at_end_in_words(&self, stated: bool) -> String {
+        let at_end = figure(&self.at_end, stated);
+        let last_hour = match &self.range_last_hour {
+            Some(range) => format!("range of the last hour {} µm", figure(range, stated)),
+            None => "recorded too briefly for the range of the last hour".to_owned(),
+        };
+        format!("Drift at the end {at_end} µm; {last_hour}.")
     }
 }
 
@@ -213,6 +240,12 @@ mod tests {
         assert!((after - 0.008).abs() < 1e-12, "{after}");
         assert!((found.after_3_h.unwrap().value_mm - 0.004).abs() < 1e-12);
         assert!((found.range.value_mm - 0.0095).abs() < 1e-12);
+        assert!((found.at_end.value_mm - 0.004).abs() < 1e-12);
+        // Of the last hour two readings are too few; with one between, 10.002 to 10.0055.
+        assert!(found.range_last_hour.is_none());
+        let values = [&values[..4], &[(9000.0, 10.005_5)], &values[4..]].concat();
+        let last_hour = self::found(&values).unwrap().range_last_hour.unwrap();
+        assert!((last_hour.value_mm - 0.0035).abs() < 1e-12);
         // Two readings lie in the last hour: the rate is that of the whole.
         assert!((found.rate_window_s - 10_800.0).abs() < 1e-9);
         let short = self::found(&values[..3]).unwrap();

@@ -56,9 +56,9 @@ pub(super) fn section(
                 .answers
                 .push(in_short(range, [after_1_h, after_3_h], &found));
             section.tables.push(table(log, &cells, (budget, mandrel)));
-            section
-                .lines
-                .extend(found.contributions.as_ref().map(parts));
+            section.lines.push(found.at_end_in_words(budget.is_some()));
+            let parts = found.contributions.as_ref().map(parts);
+            section.lines.extend(parts);
             if found.after_3_h.is_none() {
                 section.warn("Recorded too briefly", too_short(recorded_s));
             }
