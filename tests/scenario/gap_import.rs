@@ -262,6 +262,50 @@ fn a_scale_that_a_laser_shows_clearly_is_told_with_its_size_and_all_that_make_th
     }
 }
 
+/// A simulator that has the machine's scale error and no play, and writes tables as a laser does.
+#[test]
+fn a_table_of_another_simulator_takes_the_place_of_the_prediction() {
+    let home = TempDir::new().unwrap();
+    let file = |name: &str| home.path().join(name);
+    let mut noise = Pcg64Mcg::seed_from_u64(20_261_129);
+    std::fs::write(file("laser.csv"), laser(&mut noise, 5)).unwrap();
+    let mut table = String::from("run,target_mm,deviation_um\n");
+    for run in 1..=5 {
+        for k in (0..14).chain((0..14).rev()) {
+            let at_mm = -280.0 + 560.0 * f64::from(k) / 13.0;
+            writeln!(table, "{run},{at_mm:.3},{:.3}", 12e-3 * at_mm).unwrap();
+        }
+    }
+    std::fs::write(file("simulator.csv"), table).unwrap();
+    std::fs::write(
+        file("map.yaml"),
+        "start_s: 1767600000\nat_mm: {Y: 0.0, Z: 120.0}\ntest:\n  positioning: {axis: X, feed_mm_min: 6000.0, dwell_s: 2.0, overrun_mm: 5.0, run: run, target_mm: target_mm, deviation_um: deviation_um}\n",
+    )
+    .unwrap();
+    let (laser, simulator) = (shown(&file("laser.csv")), shown(&file("simulator.csv")));
+    let (map, report) = (shown(&file("map.yaml")), shown(&file("gap.json")));
+    let ended = run(&[
+        "diagnose",
+        &laser,
+        "--simulated",
+        &simulator,
+        "--map",
+        &map,
+        "--machine",
+        MACHINE,
+        "--json",
+        &report,
+    ]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+    let report: Value = serde_json::from_str(&std::fs::read_to_string(&report).unwrap()).unwrap();
+    assert_eq!(report["simulated"]["bags"][0]["path"], simulator.as_str());
+    let [("backlash", "X", play_um)] = told(&report, "set")[..] else {
+        panic!("{:#?}", causes(&report));
+    };
+    holds(play_um, 5.0, 0.6);
+    assert_eq!(told(&report, "named"), []);
+}
+
 #[test]
 fn a_log_that_was_made_once_and_one_of_three_mornings_are_diagnosed() {
     let home = TempDir::new().unwrap();

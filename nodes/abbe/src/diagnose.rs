@@ -30,6 +30,7 @@ use crate::history::alarms::{self, Alarms, LimitsOption};
 use crate::history::keep::Keep;
 use crate::history::origin::Origin;
 use crate::pdf;
+use crate::report_bag::from_table;
 use crate::tell::tell;
 
 pub mod bags;
@@ -55,7 +56,7 @@ pub struct Diagnose {
     /// Machine file that the simulator runs on; without it the one in the first bag.
     #[arg(long)]
     machine: Option<PathBuf>,
-    /// Bag that your own simulator made of the same tests, in the place of the twin's prediction; may be given several times.
+    /// Bag or table that your own simulator made of the same tests, in the place of the twin's prediction; may be given several times.
     #[arg(long, value_name = "SIM", conflicts_with = "write_machine")]
     simulated: Vec<PathBuf>,
     /// Write the report as JSON (abbe.gap/1); `-` for standard output instead of the page.
@@ -126,8 +127,10 @@ impl Diagnose {
         };
         let budget = self.budget.as_deref().map(Budget::open).transpose()?;
         let limits = self.limits.open()?;
-        let mut diagnosed = beside(&opened.bags, &self.simulated, &name, &text, &config)?;
+        let simulated = self.opened_simulated((&name, &text))?;
+        let mut diagnosed = beside(&opened.bags, &simulated.bags, &name, &text, &config)?;
         opened.name_as_given(&mut diagnosed, &self.bags);
+        simulated.name_simulated(&mut diagnosed, &self.simulated);
         let machine = MachineFile::parse(&text, &name)?.name;
         let title = format!("Simulator against machine: {machine}");
         let mut page = gap::page(&title, &diagnosed, self.explain)?;
@@ -169,7 +172,8 @@ impl Diagnose {
             complain!("abbe: {remark}");
         }
         let kept = self.print_and_keep(&page, &diagnosed, (&opened, machine));
-        let code = loss::exit_code(diagnosed.losses().is_empty() && opened.is_whole());
+        let are_whole = opened.is_whole() && simulated.is_whole();
+        let code = loss::exit_code(diagnosed.losses().is_empty() && are_whole);
         alarms::ended(alarms.as_ref(), kept, code)
     }
 
@@ -190,6 +194,13 @@ impl Diagnose {
             None => bags::machine_text(&opened.bags[0])?,
         };
         Ok((opened, machine))
+    }
+
+    /// The bags and tables of another simulator, for the same machine file.
+    fn opened_simulated(&self, machine: (&str, &str)) -> Result<Opened> {
+        let has_tables = self.simulated.iter().any(|path| from_table::is_table(path));
+        let map = self.map.as_deref().filter(|_| has_tables);
+        Opened::of(&self.simulated, map, Some(machine)).context("--simulated")
     }
 
     /// The JSON, and the figures that are kept beside their limits, which are behind page and JSON.

@@ -75,12 +75,25 @@ impl Opened {
         self.tables.iter().all(|table| table.n_odd == 0)
     }
 
+    /// Names a simulator's bags as they were given.
+    pub fn name_simulated(&self, diagnosed: &mut Diagnosed, given: &[PathBuf]) {
+        let inputs = diagnosed.simulated.iter_mut().flat_map(|it| &mut it.bags);
+        for (input, path) in inputs.zip(given) {
+            input.path = path.display().to_string();
+        }
+        self.name_in_remarks(diagnosed, given);
+    }
+
     /// Names bags as they were given: the folder of a table is no more when the report is read.
     pub fn name_as_given(&self, diagnosed: &mut Diagnosed, given: &[PathBuf]) {
         let inputs = diagnosed.diagnosis.report.inputs.bags.iter_mut();
         for (input, path) in inputs.zip(given) {
             input.path = path.display().to_string();
         }
+        self.name_in_remarks(diagnosed, given);
+    }
+
+    fn name_in_remarks(&self, diagnosed: &mut Diagnosed, given: &[PathBuf]) {
         for (bag, path) in self.bags.iter().zip(given) {
             let [bag, path] = [bag, path].map(|path| path.display().to_string());
             for remark in &mut diagnosed.remarks {
