@@ -12,7 +12,6 @@ pub(crate) mod confirm;
 pub(crate) mod form_doubt;
 pub(crate) mod guard;
 pub(crate) mod in_common;
-pub(crate) mod one_feed;
 pub(crate) mod plain;
 pub(crate) mod recalibration;
 pub mod rule;
