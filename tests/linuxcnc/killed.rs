@@ -299,3 +299,41 @@ fn nothing_runs() -> bool {
     found.args(["rtapi_app", "milltask", "linuxcncrsh"]);
     found.output().unwrap().stdout.is_empty()
 }
+
+/// The process that ends LinuxCNC when its bridge is gone.
+fn has_guard() -> bool {
+    let mut found = Command::new("pgrep");
+    found.args(["-f", "abbe-linuxcnc-guard"]);
+    !found.output().unwrap().stdout.is_empty()
+}
+
+#[test]
+fn a_linuxcnc_that_was_only_starting_when_its_bridge_was_killed_ends_too() {
+    if !installed() {
+        return;
+    }
+    let _turn = ONE_AT_A_TIME
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    let deadline = Instant::now() + Duration::from_secs(600);
+    // Not beside somebody else's.
+    while has_guard() {
+        assert!(Instant::now() < deadline, "another one runs");
+        std::thread::sleep(Duration::from_secs(1));
+    }
+    let file = root().join("launch_configs/linuxcnc_latency/linuxcnc_bridge.yaml");
+    let mut starts = command(domain(19), &["node", "linuxcnc_bridge", "--ros-args"]);
+    starts.arg("--params-file").arg(&file);
+    let mut bridge = Process::start(starts);
+    while !has_guard() {
+        assert!(bridge.is_running() && Instant::now() < deadline, "no guard");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    bridge.signal(Signal::SIGKILL);
+    drop(bridge);
+    let until = Instant::now() + START;
+    while has_guard() || !nothing_runs() {
+        assert!(Instant::now() < until, "LinuxCNC is left behind");
+        std::thread::sleep(Duration::from_millis(200));
+    }
+}

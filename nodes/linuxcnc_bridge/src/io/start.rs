@@ -37,7 +37,11 @@ const PROCESSES: [&str; 4] = ["linuxcncrsh", "linuxcncsvr", "milltask", "rtapi_a
 const GUARD: &str = r#"
 { linuxcnc -r "$1" </dev/null; : >"$6"; } &
 read -r _
-if exec 3<>"/dev/tcp/$2/$3"; then
+# One that is only just starting does not listen yet.
+until [ -e "$6" ] || { exec 3<>"/dev/tcp/$2/$3"; } 2>/dev/null; do
+  sleep 0.2
+done
+if [ ! -e "$6" ]; then
   printf 'hello %s abbe 1.0\r\nset enable %s\r\nshutdown\r\n' "$4" "$5" >&3
   cat <&3 >/dev/null
 fi
