@@ -133,10 +133,13 @@ fn section(tests: &Tests, test: &LinearTest, budget: Option<&Budget>) -> Result<
             change::state(&mut section, (test, &runs), (tests, budget), r_mm);
         }
         Err(error) => {
-            let why = too_short(test).or_else(|| without_places(tests, test));
+            let too_short = too_short(test);
+            // A run that was not made to be read at its stops lacks nothing.
+            let is_lost = test.targets_mm.is_empty() && too_short.is_none();
+            let why = too_short.or_else(|| without_places(tests, test));
             let why = why.or_else(|| without_readings(test));
             let why = why.unwrap_or_else(|| error.to_string());
-            if test.targets_mm.is_empty() {
+            if is_lost {
                 section.without_figures(why);
             } else {
                 section.not_evaluated(why);
