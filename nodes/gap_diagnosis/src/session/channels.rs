@@ -269,15 +269,15 @@ impl Scope<'_> {
         }
         if self.motion.axes.iter().any(|axis| bow(axis) > BOW) {
             let before = k.checked_sub(1).map(|before| &ticks[before]);
+            let step_s = before.map_or(0.0, |before| (ticks[k].at - before.at).as_secs_f64());
             // Of axes that stood only some ticks are kept.
-            let usual_s = before.map_or(0.0, |before| {
-                let step_s = (ticks[k].at - before.at).as_secs_f64();
-                if stands(before, &ticks[k]) {
-                    step_s.max(STANDING_S)
-                } else {
-                    step_s
-                }
-            });
+            let stood =
+                stands(&ticks[k], after) || before.is_some_and(|before| stands(before, &ticks[k]));
+            let usual_s = if stood {
+                step_s.max(STANDING_S)
+            } else {
+                step_s
+            };
             return Err(if dt_s < FULL_RATE * usual_s {
                 Reason::TooUneven
             } else {
