@@ -76,7 +76,7 @@ impl LaunchNode {
     /// Its arguments, read.
     ///
     /// # Errors
-    /// With the place of the node, when one of them is none.
+    /// With the place of the node, when one of them cannot be read.
     pub fn arguments(&self) -> Result<Arguments> {
         Arguments::parse(self.ros_args()).with_context(|| self.described())
     }

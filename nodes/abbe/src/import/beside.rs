@@ -39,7 +39,7 @@ pub fn plane(head: &[String], lines: &Lines) -> Option<(String, Plane)> {
     first(head, lines, PLANE_NAMES, plane_of)
 }
 
-/// What is wrong with a column of axes or planes whose words are none.
+/// What is wrong with a column of axes or planes that names no axis or plane.
 pub fn odd(head: &[String], lines: &Lines) -> Option<String> {
     let of_planes = || {
         odd_cell(head, lines, PLANE_NAMES, |cell| plane_of(cell).is_some()).map(|odd| {

@@ -68,7 +68,7 @@ fn is_hidden(rest: &[u8]) -> bool {
         || sizes.any(|size| values(rest, size).iter().any(|value| is_zero(value)))
 }
 
-/// Whether a height or width is none.
+/// Whether a height or width is zero.
 fn is_zero(value: &[u8]) -> bool {
     let size = std::str::from_utf8(value)
         .ok()

@@ -30,7 +30,7 @@ pub fn is_empty(pass: &[Reading]) -> bool {
     pass.iter().all(|one| one.deviation.abs() <= 0.0)
 }
 
-/// Leaves out passes that are no measurement, and tells of those that the file lacks.
+/// Leaves out passes that are no measurement, and counts those missing in the file.
 pub fn leave_out(passes: &mut Passes, run_count: Option<usize>) -> Vec<String> {
     let most = passes.values().map(Vec::len).max().unwrap_or(0);
     let n_listed = passes.len();

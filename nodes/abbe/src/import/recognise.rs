@@ -87,7 +87,7 @@ pub struct Recognised {
     pub axis_column: Option<(String, Axis)>,
     /// A column of planes, with the first of them.
     pub plane_column: Option<(String, Plane)>,
-    /// What is wrong with a column of axes or planes whose words are none.
+    /// What is wrong with a column of axes or planes that names no axis or plane.
     pub odd: Option<String>,
 }
 

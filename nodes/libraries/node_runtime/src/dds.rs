@@ -118,7 +118,7 @@ struct ByHand {
 }
 
 impl ByHand {
-    /// And who has met whom, which the first samples need.
+    /// Opens the socket and begins to listen for writers that were met.
     fn of(participant: &DomainParticipant) -> std::io::Result<(Self, Meetings)> {
         let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
         socket.set_nonblocking(true)?;

@@ -1,4 +1,4 @@
-//! Who has met whom: what the DDS library tells of its own readers and writers and those of others.
+//! Which readers of others each writer of ours sends to, by the events of the DDS library.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -22,7 +22,7 @@ pub(super) struct Meetings {
 }
 
 impl Meetings {
-    /// `on_writer` is told of each reader of ours that has met a writer of others. Must be made inside a runtime.
+    /// `on_writer` is called with each reader of ours that has matched a writer of others. Must be made inside a runtime.
     pub fn of(
         participant: &DomainParticipant,
         on_writer: impl Fn(Guid, GUID) + Send + 'static,
