@@ -131,7 +131,7 @@ pub fn read(path: &Path) -> Result<Vec<LaunchNode>> {
     let mut nodes = nodes.with_context(|| format!("launch file {}", path.display()))?;
     for node in &mut nodes {
         node.place = format!("{}:{}", path.display(), node.place);
-        // Of a node that is none the name is told by who looks for it.
+        // An unknown node is refused by name where the nodes are built.
         if crate::node::builder(&node.exec).is_some() {
             node.arguments()?;
         }

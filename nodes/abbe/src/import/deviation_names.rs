@@ -261,7 +261,7 @@ pub fn doubt(name: &str) -> Option<String> {
         .find(|word| !is_known(word) && !is_unit(word))
 }
 
-/// `Error No.` without what is numbered, and `x 2`, `x 0.1`.
+/// `Error No.` without what is numbered, and `x 10`, `x 0.1`.
 fn odd_number(words: &[String]) -> Option<String> {
     // `X 2` is the second run of X.
     let is_factor = |word: &String| word.parse::<u32>().is_ok_and(|n| n == 0 || n >= 10);

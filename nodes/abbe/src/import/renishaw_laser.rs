@@ -525,7 +525,7 @@ mod tests {
             ),
             "{said}"
         );
-        // A measurement that was broken off is whole as a file, without the pass that is none.
+        // The file of a measurement that was broken off is whole; its short pass is left out.
         let short = MADE.replace("2   2      1\r\n2   1      0.75\r\n", "");
         assert_eq!(rows(&short).len(), 3);
     }

@@ -78,7 +78,7 @@ fn a_time_without_a_speed_is_named_and_none_at_all_is_refused() {
     );
 }
 
-/// By hand: X is told until 10:00:06 and from 10:00:22 on; Y, which the mapping has, never.
+/// By hand: the log has X until 10:00:06 and from 10:00:22 on; Y, which the mapping has, is not in it.
 #[test]
 fn times_without_a_position_and_positions_that_are_not_followed_are_named() {
     let map = "values:\n  Xabs: {is: position, axis: X, unit: MILLIMETER}\n  Yabs: {is: position, axis: Y, unit: MILLIMETER}\n  Babs: {is: position, axis: B, unit: DEGREE}\n  Srpm: {is: spindle_speed, name: spindle, unit: REVOLUTION/MINUTE}\n";

@@ -1,6 +1,6 @@
 //! Single readings of a displacement log that are far from those beside them.
 //!
-//! As at the stops of a positioning test: a reading half a millimetre from those about it is none of a machine, and takes the
+//! As at the stops of a positioning test: no machine moves by half a millimetre between readings, so such a reading takes the
 //! figures of its log away; one that is far from them and may be the machine's counts and is named.
 
 use metrology::number::number;
