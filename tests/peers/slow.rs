@@ -81,7 +81,7 @@ fn a_bag_as_fast_as_subscribers_acknowledge_waits_for_one_that_stands_and_loses_
     for service in [PAUSE, RESUME] {
         operator.matched_after_s(service);
     }
-    // The first sample right after a match may be lost by the peer's side of the match.
+    // The peer says that it has met the player as soon as it has; nothing is sent before the player has met it too.
     std::thread::sleep(Duration::from_secs(2));
     let mut desk = Desk { operator, asked: 0 };
     slow.signal(Signal::SIGSTOP);

@@ -24,6 +24,7 @@ use crate::names::{self, NodeNames};
 use crate::network::{Guid, Remote, Role};
 use absent::Absent;
 use first_sample::FirstSamples;
+use first_word::FirstWords;
 use meetings::Meetings;
 use peers::{Peers, Way};
 use reply::LongReplies;
@@ -31,6 +32,7 @@ use reply::LongReplies;
 mod absent;
 mod endpoint;
 mod first_sample;
+mod first_word;
 mod meetings;
 mod peers;
 mod policies;
@@ -114,6 +116,7 @@ pub(crate) fn role_of(dds_topic: &str) -> Option<(Role, &str)> {
 /// What a node sends past the library.
 struct ByHand {
     first_samples: FirstSamples,
+    first_words: FirstWords,
     socket: Arc<UdpSocket>,
 }
 
@@ -124,9 +127,11 @@ impl ByHand {
         socket.set_nonblocking(true)?;
         let socket = Arc::new(socket);
         let (first_samples, ask) = FirstSamples::of(participant, Arc::clone(&socket));
-        let meetings = Meetings::of(participant, ask);
+        let (first_words, tell) = FirstWords::of(participant, Arc::clone(&socket));
+        let meetings = Meetings::of(participant, ask, tell);
         let by_hand = Self {
             first_samples,
+            first_words,
             socket,
         };
         Ok((by_hand, meetings))
@@ -246,7 +251,7 @@ impl Participant {
             subscriber.create_simple_datareader_no_key(&topic, Some(policies::graph_reader()))?;
         let entities = Mutex::new(NodeEntitiesInfo::new(node.clone()));
         let (by_hand, meetings) = if is_encrypted {
-            (None, Meetings::of(&participant, |_, _| {}))
+            (None, Meetings::of(&participant, |_, _| {}, |_, _| {}))
         } else {
             let (by_hand, meetings) = ByHand::of(&participant)?;
             (Some(by_hand), meetings)
@@ -315,10 +320,17 @@ impl Participant {
     fn writer_of(&self, dds_topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Writer> {
         let topic = self.topic(dds_topic, dds_type, qos)?;
         let policies = policies::policies(qos, policies::Side::Writer);
-        let writer = self
-            .publisher
-            .create_datawriter_no_key(&topic, Some(policies))
-            .map_err(|error| anyhow!("DDS writer of {dds_topic}: {error}"))?;
+        let make = || {
+            self.publisher
+                .create_datawriter_no_key(&topic, Some(policies))
+        };
+        let made = match &self.by_hand {
+            Some(by_hand) if qos.reliability == Reliability::Reliable => by_hand
+                .first_words
+                .take_care(make, |writer| writer.guid().to_bytes()),
+            _ => make(),
+        };
+        let writer = made.map_err(|error| anyhow!("DDS writer of {dds_topic}: {error}"))?;
         self.entities().add_writer(Gid::from(writer.guid()));
         Ok(Writer::new(writer))
     }

@@ -22,10 +22,12 @@ pub(super) struct Meetings {
 }
 
 impl Meetings {
-    /// `on_writer` is called with each reader of ours that has matched a writer of others. Must be made inside a runtime.
+    /// `on_writer` is called with each reader of ours that has matched a writer of others, `on_reader` with each writer
+    /// that has matched a reader. Must be made inside a runtime.
     pub fn of(
         participant: &DomainParticipant,
         on_writer: impl Fn(Guid, GUID) + Send + 'static,
+        on_reader: impl Fn(Guid, GUID) + Send + 'static,
     ) -> Self {
         let met = Met::default();
         let ours = Arc::clone(&met);
@@ -41,6 +43,7 @@ impl Meetings {
                         remote_reader,
                     } => {
                         met().insert((local_writer.to_bytes(), remote_reader.to_bytes()));
+                        on_reader(local_writer.to_bytes(), remote_reader);
                     }
                     DomainParticipantStatusEvent::ReaderLost { guid, .. } => {
                         let gone = guid.to_bytes();

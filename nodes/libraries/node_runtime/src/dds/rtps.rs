@@ -1,5 +1,5 @@
 //! What is sent past the DDS library, as RTPS 2.5 has it on the wire: a sample in fragments (8.3.8.3, 9.4.5.4), a
-//! reader's request for a writer's first sample (8.3.8.1, 9.4.5.2), word that a participant is alive (8.3.8.2, 9.4.5.3), and
+//! reader's request for a writer's first sample (8.3.8.1, 9.4.5.2), a writer's word that it has none yet, word that a participant is alive (8.3.8.2, 9.4.5.3), and
 //! the announcement of one that only listens (8.5.3.2). And what is read past it: who announces itself.
 //!
 //! | part of a fragments' datagram | bytes |
@@ -27,6 +27,7 @@ pub(super) type Prefix = [u8; PREFIX_LEN];
 const RTPS_HEADER_LEN: usize = 20;
 const VERSION: [u8; 2] = [2, 4];
 const ACKNACK: u8 = 0x06;
+const HEARTBEAT: u8 = 0x07;
 const INFO_TS: u8 = 0x09;
 const INFO_SRC: u8 = 0x0c;
 const INFO_DST: u8 = 0x0e;
@@ -106,6 +107,26 @@ pub(super) fn asking_for_first(reader: &Guid, writer: &Guid, count: u32) -> Vec<
         datagram.extend(number.to_le_bytes());
     }
     datagram.extend(count.to_le_bytes());
+    end(&mut datagram, begun);
+    datagram
+}
+
+/// The datagram by which a writer tells a reader that it has written nothing yet (8.3.8.6, 9.4.5.7), under the count of
+/// its first heartbeat.
+pub(super) fn nothing_written(writer: &Guid, reader: &Guid) -> Vec<u8> {
+    let (participant, writer) = writer.split_at(PREFIX_LEN);
+    let (whose, reader) = reader.split_at(PREFIX_LEN);
+    let mut datagram = from(participant);
+    let begun = begin(&mut datagram, INFO_DST, LITTLE_ENDIAN);
+    datagram.extend(whose);
+    end(&mut datagram, begun);
+    let begun = begin(&mut datagram, HEARTBEAT, LITTLE_ENDIAN);
+    datagram.extend(reader);
+    datagram.extend(writer);
+    for number in [1, 0] {
+        put_halves(&mut datagram, number);
+    }
+    datagram.extend(1_u32.to_le_bytes());
     end(&mut datagram, begun);
     datagram
 }
@@ -339,6 +360,21 @@ mod tests {
         assert_eq!(datagram[40..48], [7, 7, 7, 7, 9, 9, 9, 9]);
         assert_eq!(datagram[48..56], [0, 0, 0, 0, 1, 0, 0, 0]);
         assert_eq!(datagram[56..], [1, 0, 0, 0, 0, 0, 0, 128, 1, 0, 0, 0]);
+    }
+
+    /// Bytes as RTPS 2.5 has them: 9.4.5.7 (HEARTBEAT).
+    #[test]
+    fn a_writer_without_samples_says_from_one_to_none() {
+        let datagram = nothing_written(&[9; 16], &[7; 16]);
+        assert_eq!(sender(&datagram), Some([9; PREFIX_LEN]));
+        assert_eq!(datagram[24..36], [7; 12]);
+        assert_eq!(datagram[36..40], [7, 1, 28, 0]);
+        assert_eq!(datagram[40..48], [7, 7, 7, 7, 9, 9, 9, 9]);
+        assert_eq!(
+            datagram[48..64],
+            [0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+        );
+        assert_eq!(datagram[64..], [1, 0, 0, 0]);
     }
 
     #[test]
