@@ -55,6 +55,7 @@ mod reference_temperature;
 pub mod rotary;
 pub mod single_run;
 mod spacing;
+pub mod whole_runs;
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};

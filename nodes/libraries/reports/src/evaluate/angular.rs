@@ -11,6 +11,7 @@ use metrology::stamp::{Host, Span, Stamp};
 
 use super::linear::slips::Outlying;
 use super::linear::targets::{Places, left_out, targets};
+use super::linear::unusable::{Contradiction, Extent, take_out};
 use super::linear::{STOP_SETTLE, Visits, axis_of, level};
 
 /// A command that moves by less rests, deg.
@@ -51,6 +52,8 @@ struct Stop {
     /// Sum of the readings less the first one, and how many.
     sum_rad: f64,
     first_rad: f64,
+    /// Of the readings less the first one.
+    extent: Extent,
     n: u32,
 }
 
@@ -114,6 +117,7 @@ impl RotaryRuns {
                     until: state.received_at,
                     sum_rad: 0.0,
                     first_rad: 0.0,
+                    extent: Extent::default(),
                     n: 0,
                 });
             }
@@ -130,7 +134,9 @@ impl RotaryRuns {
             if stop.n == 0 {
                 stop.first_rad = sample.angle_rad;
             }
-            stop.sum_rad += within_half_a_turn_rad(sample.angle_rad - stop.first_rad);
+            let beside_rad = within_half_a_turn_rad(sample.angle_rad - stop.first_rad);
+            stop.sum_rad += beside_rad;
+            stop.extent.add(beside_rad);
             stop.n += 1;
         }
     }
@@ -152,12 +158,14 @@ fn test(group: &[Run]) -> Option<RotaryTest> {
     let read = || group.iter().flat_map(|run| &run.stops);
     let zero_rad = read().find_map(Stop::deviation_rad);
     let places = Places::of(read().filter(|stop| stop.is_approach()).map(Stop::at_deg));
-    let runs: Vec<Visits> = group
+    let mut runs: Vec<Visits> = group
         .iter()
         .map(|run| visits(run, zero_rad.unwrap_or(0.0), &places))
         .collect();
-    let (targets, sides) = targets(&runs);
     let mut numbers: Vec<u32> = group.iter().map(|run| run.begin.run).collect();
+    let contradictory: Vec<Vec<Contradiction>> = group.iter().map(Run::contradictions).collect();
+    let unusable = take_out(&mut runs, &mut numbers, &contradictory);
+    let (targets, sides) = targets(&runs);
     let mut left_out = left_out(&runs, &numbers, (&targets, sides), (&places, "deg"));
     let of = |side: usize| {
         if !sides.contains(&side) {
@@ -170,7 +178,7 @@ fn test(group: &[Run]) -> Option<RotaryTest> {
     let targets_deg = places.at(&targets);
     let targets_rad: Vec<f64> = targets_deg.iter().map(|deg| deg.to_radians()).collect();
     let sides = [&mut up_rad, &mut down_rad];
-    let outlying = Outlying::of(false, &targets_rad, &mut numbers, sides);
+    let outlying = Outlying::of(false, &targets_rad, &mut numbers, sides).with(unusable);
     left_out.extend(outlying.left_out());
     let mean_rad = zero_rad.unwrap_or(0.0) + level(&mut up_rad, &mut down_rad);
     Some(RotaryTest {
@@ -185,6 +193,22 @@ fn test(group: &[Run]) -> Option<RotaryTest> {
         longest_rest: read().map(|stop| stop.until - stop.since).max(),
         has_readings: zero_rad.is_some(),
     })
+}
+
+impl Run {
+    /// The stops whose readings contradict each other.
+    fn contradictions(&self) -> Vec<Contradiction> {
+        let of = |stop: &Stop| {
+            Some(Contradiction {
+                is_linear: false,
+                at: stop.at_deg(),
+                is_up: stop.way_deg() > 0.0,
+                apart: stop.extent.contradiction(false)?,
+            })
+        };
+        let stops = self.stops.iter().filter(|stop| stop.is_approach());
+        stops.filter_map(of).collect()
+    }
 }
 
 impl Stop {

@@ -15,9 +15,11 @@ use nalgebra::Vector3;
 
 pub mod slips;
 pub(super) mod targets;
+pub(super) mod unusable;
 
 use slips::Outlying;
 use targets::{Places, left_out, targets};
+use unusable::{Contradiction, Extent, take_out};
 
 /// Rest after which readings count.
 pub const STOP_SETTLE: Span = Span::from_nanos(300_000_000);
@@ -107,6 +109,7 @@ struct Stop {
     since: Stamp<Host>,
     until: Stamp<Host>,
     sum_mm: f64,
+    extent: Extent,
     scale_sum_mm: Vector3<f64>,
     n: u32,
     n_scale: u32,
@@ -118,6 +121,8 @@ struct Reading {
     place_mm: Vector3<f64>,
     from_mm: Vector3<f64>,
     length_mm: Option<f64>,
+    /// How far its readings of the length lie apart, where they contradict each other, mm.
+    apart_mm: Option<f64>,
     scale_mm: Vector3<f64>,
 }
 
@@ -201,6 +206,7 @@ impl LinearRuns {
                     since: state.received_at,
                     until: state.received_at,
                     sum_mm: 0.0,
+                    extent: Extent::default(),
                     scale_sum_mm: Vector3::zeros(),
                     n: 0,
                     n_scale: 0,
@@ -215,6 +221,7 @@ impl LinearRuns {
             && sample.at - stop.since >= STOP_SETTLE
         {
             stop.sum_mm += sample.displacement_mm;
+            stop.extent.add(sample.displacement_mm);
             stop.n += 1;
         }
     }
@@ -252,6 +259,7 @@ impl Stop {
             place_mm: self.place_mm,
             from_mm: self.from_mm,
             length_mm,
+            apart_mm: self.extent.contradiction(true),
             scale_mm,
         })
     }
@@ -269,13 +277,7 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
     let (first, ..) = group.first()?;
     let axis = axis_of(first);
     let stops = || group.iter().flat_map(|(_, run, _)| &run.stops);
-    // Where the reference is put up and zeroed it says nothing yet. Where nothing was read, no scale was.
-    let is_by_length = stops().any(|stop| stop.length_mm.is_some());
-    let reference = if is_by_length || stops().next().is_none() {
-        Reference::Length
-    } else {
-        Reference::Scale
-    };
+    let reference = reference(stops());
     let rests = group.iter().flat_map(|(_, run, _)| &run.rests);
     let direction = direction(axis, stops().map(|stop| &stop.place_mm))
         .or_else(|| direction(axis, rests.map(|(place_mm, _)| place_mm)))?;
@@ -284,9 +286,12 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
         .map(|(_, run, _)| approaches(run, axis, &direction, reference))
         .collect();
     let places = Places::of(read.iter().flatten().map(|one| one.along_mm));
-    let runs: Vec<Visits> = read.iter().map(|run| visits(run, &places)).collect();
-    let (targets, sides) = targets(&runs);
+    let mut runs: Vec<Visits> = read.iter().map(|run| visits(run, &places)).collect();
     let mut numbers: Vec<u32> = group.iter().map(|(segment, ..)| segment.run).collect();
+    let contradictory: Vec<Vec<Contradiction>> =
+        read.iter().map(|run| contradictions(run)).collect();
+    let unusable = take_out(&mut runs, &mut numbers, &contradictory);
+    let (targets, sides) = targets(&runs);
     let mut left_out = left_out(&runs, &numbers, (&targets, sides), (&places, "mm"));
     let of = |side: usize| {
         if !sides.contains(&side) {
@@ -299,7 +304,7 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
     let (mut up_mm, mut down_mm) = (of(0), of(1));
     let targets_mm = places.at(&targets);
     let sides = [&mut up_mm, &mut down_mm];
-    let outlying = Outlying::of(true, &targets_mm, &mut numbers, sides);
+    let outlying = Outlying::of(true, &targets_mm, &mut numbers, sides).with(unusable);
     left_out.extend(outlying.left_out());
     let mean_mm = level(&mut up_mm, &mut down_mm);
     Some(LinearTest {
@@ -326,6 +331,17 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
     })
 }
 
+/// What measured the stops.
+fn reference<'a>(mut stops: impl Iterator<Item = &'a Reading> + Clone) -> Reference {
+    // Where the reference is put up and zeroed it says nothing yet. Where nothing was read, no scale was.
+    let is_by_length = stops.clone().any(|stop| stop.length_mm.is_some());
+    if is_by_length || stops.next().is_none() {
+        Reference::Length
+    } else {
+        Reference::Scale
+    }
+}
+
 /// Where the line leads: along its axis, or from the first place to the farthest.
 fn direction<'a>(
     axis: Option<Axis>,
@@ -344,6 +360,7 @@ struct Approach {
     along_mm: f64,
     deviation_mm: f64,
     upwards: bool,
+    apart_mm: Option<f64>,
 }
 
 fn approaches(
@@ -369,9 +386,23 @@ fn approaches(
             along_mm,
             deviation_mm: read_mm - along_mm,
             upwards: way_mm > 0.0,
+            apart_mm: stop.apart_mm.filter(|_| reference == Reference::Length),
         })
     };
     run.stops.iter().filter_map(approach).collect()
+}
+
+/// The stops of a run whose readings contradict each other.
+fn contradictions(run: &[Approach]) -> Vec<Contradiction> {
+    let of = |approach: &Approach| {
+        Some(Contradiction {
+            is_linear: true,
+            at: approach.along_mm,
+            is_up: approach.upwards,
+            apart: approach.apart_mm?,
+        })
+    };
+    run.iter().filter_map(of).collect()
 }
 
 fn visits(run: &[Approach], places: &Places) -> Visits {

@@ -10,7 +10,7 @@ use metrology::number::number;
 use crate::evaluate::circles::median;
 
 /// Farther from the middle of its target no reading of a run that counts is: mm, and rad of a rotary axis.
-const SLIP: [f64; 2] = [0.5, 0.005];
+pub(super) const SLIP: [f64; 2] = [0.5, 0.005];
 /// A reading this many times as far from its nearest neighbour as the others are from each other is far from them.
 const FAR_SPANS: f64 = 20.0;
 /// Nearer none is far: mm, and rad.
@@ -42,7 +42,7 @@ struct Place {
 /// Readings of a test that are far from the others of their targets.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Outlying {
-    /// Runs that a slip makes invalid, which no figure counts: their numbers, and their first slip in words.
+    /// Runs that no figure counts: a slip or contradictory readings make them invalid, or they were broken off. Their numbers, and the reason.
     pub slips: Vec<(u32, String)>,
     /// Readings that every figure counts, a sentence each.
     pub far: Vec<String>,
@@ -78,6 +78,13 @@ impl Outlying {
         runs.retain(|_| sound.next().is_none_or(|sound| *sound));
         let (_, far) = of(runs, up, down);
         Self { slips, far }
+    }
+
+    /// With runs that were taken out before, in the order of their numbers.
+    pub(in crate::evaluate) fn with(mut self, unusable: Vec<(u32, String)>) -> Self {
+        self.slips.extend(unusable);
+        self.slips.sort_by_key(|(run, _)| *run);
+        self
     }
 
     /// The runs that do not count, for the list of what was left out.
@@ -186,12 +193,17 @@ impl Deviations<'_> {
     }
 
     fn size(&self, value: f64) -> String {
-        if self.is_linear {
-            format!("{} µm", number((value * 1e4).round() / 10.0))
-        } else {
-            let arcsec = value.to_degrees() * 3600.0;
-            format!("{} arcsec", number((arcsec * 100.0).round() / 100.0))
-        }
+        size(self.is_linear, value)
+    }
+}
+
+/// A deviation in µm or arcsec, of one in mm or rad.
+pub(super) fn size(is_linear: bool, value: f64) -> String {
+    if is_linear {
+        format!("{} µm", number((value * 1e4).round() / 10.0))
+    } else {
+        let arcsec = value.to_degrees() * 3600.0;
+        format!("{} arcsec", number((arcsec * 100.0).round() / 100.0))
     }
 }
 

@@ -193,6 +193,70 @@ fn a_target_that_a_run_lacks_or_has_twice_is_named_with_the_run() {
 }
 
 #[test]
+fn a_run_that_was_broken_off_is_left_out_whole_and_takes_no_target_from_the_others() {
+    let whole = &[5.5, 10.0, 20.0, 30.0, 35.5, 30.0, 20.0, 10.0][..];
+    for (broken_off, n) in [
+        (&[5.5, 10.0, 20.0][..], 2),
+        (&[5.5, 10.0, 20.0, 30.0], 3),
+        (&[35.5, 30.0], 1),
+        (&[5.5, 10.0, 20.0, 30.0, 35.5, 30.0], 4),
+    ] {
+        for place in [0, 1, 3] {
+            let mut ways = vec![whole; 3];
+            ways.insert(place, broken_off);
+            let found = &tests_of(&ways)[0];
+            assert_eq!(found.targets_mm, [10.0, 20.0, 30.0], "{broken_off:?}");
+            assert_eq!((found.up_mm.len(), found.down_mm.len()), (3, 3));
+            assert_eq!(found.runs.len(), 3);
+            let run = place as u32 + 1;
+            let [(named, reason)] = &found.outlying.slips[..] else {
+                panic!("{:?}", found.outlying);
+            };
+            assert_eq!(*named, run);
+            let words =
+                format!("it has {n} readings where a complete run has 6: it was broken off");
+            assert!(reason.starts_with(&words), "{reason}");
+            assert_eq!(found.left_out, [format!("run {run}: {reason}")]);
+        }
+    }
+}
+
+#[test]
+fn a_stop_whose_readings_contradict_each_other_leaves_its_run_out_by_name() {
+    for (run_with, apart_mm, is_used) in [(1, 0.4, true), (1, 0.6, false), (0, 40.0, false)] {
+        let mut machine = Machine::new();
+        for repeat in 0..3 {
+            let of = |begin| segment(repeat + 1, repeat, begin, TestKind::Positioning, &["X"]);
+            machine.runs.segment(&of(true));
+            for x_mm in [10.0, 20.0, 35.0, 20.0, 10.0] {
+                machine.go(Vector3::new(x_mm, 0.0, 0.0), 60, |_, _| 0.0);
+                let is_second = repeat == run_with && f64::abs(x_mm - 20.0) < 1e-9;
+                // A second series of readings, as of another clock.
+                for _ in 0..if is_second { 20 } else { 0 } {
+                    machine.tick(Vector3::new(x_mm, 0.0, 0.0), Some(x_mm + apart_mm));
+                }
+            }
+            machine.runs.segment(&of(false));
+        }
+        let found = &machine.runs.tests()[0];
+        let slips = &found.outlying.slips;
+        assert_eq!(slips.is_empty(), is_used, "{slips:?}");
+        if let [(run, reason)] = &slips[..] {
+            assert_eq!((*run, found.runs.len()), (run_with + 1, 2));
+            let words = format!(
+                "readings of the stop at 20.000 mm up differ by {} µm, at most 500 µm",
+                apart_mm * 1e3
+            );
+            assert!(reason.starts_with(&words), "{reason}");
+            assert!(
+                reason.ends_with("; 1 more such stops of this run"),
+                "{reason}"
+            );
+        }
+    }
+}
+
+#[test]
 fn stops_a_few_nanometres_apart_are_one_target() {
     // Up it ends 1.1 nm before each target and down 1.1 nm beyond, as steps of 1/6 mm do about inches.
     let there = [10.0, 20.0, 30.0].map(|x_mm| x_mm - 1.1e-6);
