@@ -18,6 +18,8 @@ pub mod clock_parts;
 pub mod dates;
 #[path = "../../nodes/abbe/src/import/deviation_names.rs"]
 pub mod deviation_names;
+#[path = "../../nodes/abbe/src/import/lacking.rs"]
+pub mod lacking;
 #[path = "../../nodes/abbe/src/import/laser_conditions.rs"]
 pub mod laser_conditions;
 #[path = "../../nodes/abbe/src/import/laser_passes.rs"]
@@ -42,6 +44,8 @@ pub mod parted;
 pub mod pass_names;
 #[path = "../../nodes/abbe/src/import/passes.rs"]
 pub mod passes;
+#[path = "../../nodes/abbe/src/import/prose.rs"]
+pub mod prose;
 #[path = "../../nodes/abbe/src/import/quantities.rs"]
 pub mod quantities;
 #[path = "../../nodes/abbe/src/import/recognise.rs"]

@@ -28,6 +28,7 @@ mod deviation_names;
 mod file;
 mod hidden;
 mod instrument;
+mod lacking;
 mod laser_conditions;
 mod laser_passes;
 pub(crate) mod limits;
@@ -41,6 +42,7 @@ mod parted;
 mod pass_names;
 mod passes;
 pub(crate) mod propose;
+mod prose;
 mod quantities;
 mod recognise;
 mod renishaw_laser;
@@ -131,6 +133,8 @@ pub(crate) struct Imported {
     n_rows: usize,
     /// Cells that cost a row or a reading.
     pub n_odd: usize,
+    /// Runs of a measurement that the table lacks or that were broken off, and are not in the bag.
+    pub n_lost_runs: usize,
     /// What a reader should know: rows and columns that were left out, and what the runs were made of.
     pub notes: Vec<String>,
 }
@@ -161,7 +165,9 @@ impl Import {
                 complain!("  {note}");
             }
         }
-        Ok(loss::exit_code(imported.n_odd == 0))
+        Ok(loss::exit_code(
+            imported.n_odd == 0 && imported.n_lost_runs == 0,
+        ))
     }
 
     fn propose(&self) -> Result<ExitCode> {
@@ -240,6 +246,7 @@ pub(crate) fn import(
         n_messages: written.messages,
         n_rows,
         n_odd,
+        n_lost_runs: cells.n_lost_runs,
         notes,
     })
 }

@@ -156,7 +156,8 @@ impl ReportBag {
             &tests,
             table.as_ref().map(|table| table.bag.as_path()),
         );
-        let is_whole = tests.is_whole() && is_evaluated(&report) && n_odd == 0;
+        let is_table_whole = table.as_ref().is_none_or(|table| table.is_whole());
+        let is_whole = tests.is_whole() && is_evaluated(&report) && is_table_whole;
         alarms::ended(alarms.as_ref(), kept, loss::exit_code(is_whole))
     }
 

@@ -70,9 +70,9 @@ impl Opened {
         !self.tables.is_empty()
     }
 
-    /// Whether every cell of the tables holds a value.
+    /// Whether every cell of the tables holds a value, and no run of them is missing.
     pub fn is_whole(&self) -> bool {
-        self.tables.iter().all(|table| table.n_odd == 0)
+        self.tables.iter().all(FromTable::is_whole)
     }
 
     /// Names a simulator's bags as they were given.

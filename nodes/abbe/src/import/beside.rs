@@ -123,7 +123,8 @@ fn axis_of(cell: &str) -> Option<Axis> {
     word.parse().ok().filter(|_| words.next().is_none())
 }
 
-fn plane_of(cell: &str) -> Option<Plane> {
+/// The plane that a word names.
+pub fn plane_of(cell: &str) -> Option<Plane> {
     match cell.trim().to_uppercase().as_str() {
         "XY" | "G17" => Some(Plane::Xy),
         "YZ" | "G19" => Some(Plane::Yz),

@@ -1,9 +1,64 @@
 //! Times of two parts: hours and minutes of a clock, or minutes and seconds of a stopwatch.
 
 use anyhow::{Result, bail};
+use metrology::number::number;
+use metrology::yaml::shown;
 
+use super::table::Row;
 use super::times::{in_words, usual};
 use super::units::Unit;
+
+/// A day, s.
+const DAY_S: f64 = 86_400.0;
+/// Times of the day that go back by less do not pass midnight, s.
+const LEAST_BACK_S: f64 = DAY_S / 2.0;
+
+/// Counts times of the day on, which have no dates and pass midnight once; what was done. `place`: that of the times among the cells.
+///
+/// # Errors
+/// With line and column, where they go back otherwise.
+pub fn over_midnight(name: &str, place: usize, rows: &mut [Row]) -> Result<Option<String>> {
+    if rows.iter().any(|row| row.cells[place] >= DAY_S) {
+        return Ok(None);
+    }
+    let back_s = |two: &[Row]| two[0].cells[place] - two[1].cells[place];
+    let steps = rows.windows(2).enumerate();
+    let back: Vec<(usize, f64)> = steps
+        .map(|(k, two)| (k + 1, back_s(two)))
+        .filter(|(_, back_s)| *back_s > 0.0)
+        .collect();
+    let Some((first, by_s)) = back.first().copied() else {
+        return Ok(None);
+    };
+    let line = rows.get(first).map_or(0, |row| row.line);
+    let by = format!(
+        "line {line}, column \"{}\": the times of the day go back by {}",
+        shown(name),
+        span(by_s)
+    );
+    if back.len() > 1 || by_s < LEAST_BACK_S {
+        let more = match back.len() {
+            1 => String::new(),
+            n => format!(" (such lines: {n})"),
+        };
+        bail!("{by}{more}: write dates, as 2026-01-05 08:15:00");
+    }
+    for row in &mut rows[first..] {
+        row.cells[place] += DAY_S;
+    }
+    Ok(Some(format!(
+        "{by}: the rows from there on were taken as those of the next day: write dates where they are not"
+    )))
+}
+
+/// A span in h, or below one in s.
+fn span(of_s: f64) -> String {
+    if of_s >= 3600.0 {
+        format!("{} h", number((of_s / 36.0).round() / 100.0))
+    } else {
+        format!("{} s", number(of_s))
+    }
+}
 
 /// Whether a cell is two numbers parted by a colon, which are hours and minutes or minutes and seconds.
 pub fn has_two_parts(cell: &str) -> bool {
@@ -45,6 +100,67 @@ pub fn of_two_parts(name: &str, times_s: &[f64]) -> Result<Option<String>> {
 mod tests {
     use super::super::times::of_text;
     use super::*;
+
+    /// Rows of a log every `step_s` from a time of the day on.
+    fn log(first_s: f64, step_s: f64, n: i32) -> Vec<Row> {
+        let row = |k: i32| Row {
+            line: k as u64 + 2,
+            cells: vec![(first_s + step_s * f64::from(k)).rem_euclid(DAY_S), 0.5],
+        };
+        (0..n).map(row).collect()
+    }
+
+    #[test]
+    fn a_log_without_dates_that_passes_midnight_once_is_counted_on() {
+        for (first_s, step_s, n) in [
+            (81_000.0, 60.0, 241),
+            (86_399.0, 1.0, 10),
+            (28_800.0, 600.0, 200),
+            (43_201.0, 43_200.0, 2),
+        ] {
+            let mut rows = log(first_s, step_s, n);
+            let said = over_midnight("Time", 0, &mut rows)
+                .unwrap()
+                .expect("a remark");
+            let places = rows.iter().enumerate();
+            for (k, row) in places {
+                let wanted = first_s + step_s * k as f64;
+                assert!((row.cells[0] - wanted).abs() < 1e-6, "{row:?}");
+            }
+            assert!(said.contains("taken as those of the next day"), "{said}");
+        }
+        let said = over_midnight("Time", 0, &mut log(81_000.0, 60.0, 241));
+        let said = said.unwrap().expect("a remark");
+        let words = "line 92, column \"Time\": the times of the day go back by 23.98 h: ";
+        assert!(said.starts_with(words), "{said}");
+    }
+
+    #[test]
+    fn times_of_the_day_that_go_back_otherwise_are_refused_with_line_and_remedy() {
+        let mut dated = log(81_000.0, 60.0, 241);
+        dated.iter_mut().for_each(|row| row.cells[0] += 1.7e9);
+        for mut rows in [log(0.0, 60.0, 100), dated] {
+            let wanted = rows.clone();
+            assert_eq!(over_midnight("t", 0, &mut rows).unwrap(), None);
+            assert_eq!(rows, wanted);
+        }
+        let mut swapped = log(3600.0, 60.0, 20);
+        swapped.swap(4, 5);
+        (swapped[4].line, swapped[5].line) = (6, 7);
+        for (mut rows, words) in [
+            (
+                swapped,
+                "line 7, column \"t\": the times of the day go back by 60 s: write dates",
+            ),
+            (
+                log(43_200.0, 3600.0, 60),
+                "the times of the day go back by 23 h (such lines: 2): write dates",
+            ),
+        ] {
+            let refused = over_midnight("t", 0, &mut rows).unwrap_err().to_string();
+            assert!(refused.contains(words), "{refused}");
+        }
+    }
 
     #[test]
     fn times_of_two_parts_are_told_with_the_other_reading() {

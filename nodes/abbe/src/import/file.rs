@@ -191,8 +191,8 @@ fn worksheet(book: &mut Xlsx<Cursor<Vec<u8>>>, name: &str, decimal: char) -> Res
     let dates = dates::join(&mut lines);
     Ok(Some(Sheet {
         lines,
-        separator: None,
         dates,
+        ..Sheet::default()
     }))
 }
 

@@ -30,14 +30,16 @@ pub fn is_empty(pass: &[Reading]) -> bool {
     pass.iter().all(|one| one.deviation.abs() <= 0.0)
 }
 
-/// Leaves out passes that are no measurement, and counts those missing in the file.
-pub fn leave_out(passes: &mut Passes, run_count: Option<usize>) -> Vec<String> {
+/// Leaves out passes that are no measurement, and counts those missing in the file. In words, and how many passes of a measurement
+/// are not read.
+pub fn leave_out(passes: &mut Passes, run_count: Option<usize>) -> (Vec<String>, usize) {
     let most = passes.values().map(Vec::len).max().unwrap_or(0);
     let n_listed = passes.len();
-    let mut remarks = vec![];
+    let (mut remarks, mut n_broken_off) = (vec![], 0);
     let is_measured = passes.values().any(|pass| !is_empty(pass));
     passes.retain(|number, pass| {
         let why = if pass.len() < 2 || 2 * pass.len() < most {
+            n_broken_off += 1;
             "it was broken off"
         } else if is_measured && pass.len() >= FEWEST_ZEROS && is_empty(pass) {
             "its deviations are all 0, as of a pass that was planned and not measured"
@@ -60,7 +62,7 @@ pub fn leave_out(passes: &mut Passes, run_count: Option<usize>) -> Vec<String> {
             run_count.unwrap_or(0)
         ));
     }
-    remarks
+    (remarks, n_broken_off + missing)
 }
 
 /// The way of a pass, by the order of its targets.
@@ -129,13 +131,19 @@ mod tests {
             (vec![&[0.0; 5], &[0.0; 5]], 2, vec![]),
         ] {
             let mut found = passes(&all);
-            let said = leave_out(&mut found, Some(all.len()));
+            let (said, n_lost) = leave_out(&mut found, Some(all.len()));
+            let n_broken_off = words
+                .iter()
+                .filter(|words| !words.contains("all 0"))
+                .count();
+            assert_eq!(n_lost, n_broken_off, "{said:?}");
             assert_eq!((found.len(), said.len()), (n_kept, words.len()), "{said:?}");
             for (said, words) in said.iter().zip(words) {
                 assert!(said.contains(words), "{said}");
             }
         }
-        let said = leave_out(&mut passes(&[whole, whole]), Some(4));
+        let (said, n_lost) = leave_out(&mut passes(&[whole, whole]), Some(4));
+        assert_eq!(n_lost, 2);
         assert!(
             said[0].contains("Run-count is 4, and 2 runs have readings: 2 were not measured"),
             "{said:?}"

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Result, bail};
+use iso230::positioning::whole_runs::{is_broken_off, n_of_complete};
 
 use super::returns;
 use super::runs::{GRID_MM, Runs, gathered, ways};
@@ -43,15 +44,23 @@ pub fn without_readings(runs: &mut Vec<Vec<Row>>) -> Vec<String> {
     remarks
 }
 
-/// Names runs with less than half of the readings of the fullest: what they lack, no evaluation has.
+/// Which runs were broken off, by the readings of the others.
+pub fn are_broken_off(runs: &[Vec<Row>]) -> Vec<bool> {
+    let n_complete = n_of_complete(runs.iter().map(|rows| n_read(rows)).collect());
+    let is_one = |rows: &Vec<Row>| is_broken_off(n_read(rows), n_complete);
+    runs.iter().map(is_one).collect()
+}
+
+/// Names runs that were broken off: an evaluation leaves them out.
 pub fn broken_off(runs: &[Vec<Row>]) -> Vec<String> {
-    let most = runs.iter().map(|rows| n_read(rows)).max().unwrap_or(0);
-    let few = runs.iter().filter(|rows| 2 * n_read(rows) < most);
-    few.filter_map(|rows| {
+    let n_complete = n_of_complete(runs.iter().map(|rows| n_read(rows)).collect());
+    let all = runs.iter().zip(are_broken_off(runs));
+    let few = all.filter(|(_, is_one)| *is_one);
+    few.filter_map(|(rows, _)| {
         let first = rows.first()?;
         Some(format!(
-            "run {}, line {} on: {} readings where another run has {most}: every target that it lacks is left out of the evaluation: \
-             remove the rows of this run where it was broken off",
+            "run {}, line {} on: {} readings where a complete run has {n_complete}: it was broken off, and an evaluation leaves it out whole: \
+             repeat the run",
             first.cells[0],
             first.line,
             n_read(rows)
@@ -236,7 +245,7 @@ mod tests {
         let mut runs = good();
         runs.push(pass(3.0, 1.0, true).into_iter().take(1).collect());
         let said = broken_off(&runs);
-        let words = "run 3, line 2 on: 1 readings where another run has 3";
+        let words = "run 3, line 2 on: 1 readings where a complete run has 3: it was broken off";
         assert!(said.len() == 1 && said[0].starts_with(words), "{said:?}");
     }
 

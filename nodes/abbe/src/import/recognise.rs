@@ -8,6 +8,7 @@ use super::deviation_names;
 use super::map::{Direction, Plane};
 use super::odd::is_missing;
 use super::pass_names;
+use super::prose;
 use super::quantities;
 use super::sheet::Sheet;
 use super::stated::{self, Stated};
@@ -48,8 +49,10 @@ pub struct Known {
     pub numbers: Vec<f64>,
     /// Two cells by which its separators are those of thousands: one with and one without.
     pub thousands: Option<[String; 2]>,
-    /// Its first cell.
+    /// Its first cell that is a number or an instant.
     pub first: String,
+    /// The line of that cell.
+    pub first_line: u64,
     /// Its first cell that is no number, with its line.
     pub odd: Option<(u64, String)>,
 }
@@ -241,6 +244,7 @@ fn known(name: &str, below: Stated, lines: &[(u64, &str)], decimal: char) -> Kno
     } else {
         role(name, &words, unit, (cells, is_numeric))
     };
+    let (first_line, first) = first(lines, decimal);
     let is_bare = unit.is_none() && unknown.is_none();
     let is_place = || is_bare && is_numeric && is_warm(&words, &numbers);
     let role = role.or_else(|| is_place().then_some(Role::Temperature));
@@ -251,16 +255,17 @@ fn known(name: &str, below: Stated, lines: &[(u64, &str)], decimal: char) -> Kno
         unknown,
         numbers,
         thousands: unread::thousands(cells, decimal),
-        first: first(cells, decimal).to_owned(),
+        first: first.to_owned(),
+        first_line,
         odd: odd(lines, decimal),
     }
 }
 
-/// The first cell that is a number or an instant; otherwise the first cell.
-fn first<'c>(cells: &[&'c str], decimal: char) -> &'c str {
-    let is_value = |cell: &&&str| number_of(cell, decimal).is_some() || is_instant(cell);
-    let value = cells.iter().find(is_value).or(cells.first());
-    value.copied().unwrap_or_default()
+/// The first cell that is a number or an instant, with its line; otherwise the first cell.
+fn first<'c>(lines: &[(u64, &'c str)], decimal: char) -> (u64, &'c str) {
+    let is_value = |cell: &str| number_of(cell, decimal).is_some() || is_instant(cell);
+    let value = lines.iter().find(|(_, cell)| is_value(cell));
+    value.or(lines.first()).copied().unwrap_or_default()
 }
 
 /// The first cell that is neither a number nor an instant nor missing, with its line.
@@ -370,11 +375,6 @@ pub fn role_of_name(name: &str) -> Option<Role> {
     role(name, &quantity_words(name), None, (&[], true))
 }
 
-/// The axis of a word that is its letter.
-fn letter(word: &str) -> Option<Axis> {
-    word.parse::<Axis>().ok().filter(|_| word.len() == 1)
-}
-
 impl Recognised {
     /// The column of a role whose name says least beside it; of several the first.
     pub fn first(&self, role: Role) -> Option<&Known> {
@@ -412,31 +412,10 @@ impl Recognised {
 
     /// The axis that a column or the lines above the table state.
     pub fn axis_stated(&self) -> Option<Axis> {
-        let beside = |text: &str, is_prose: bool| {
-            let words: Vec<&str> = text
-                .split(|letter: char| !letter.is_alphanumeric())
-                .filter(|word| !word.is_empty())
-                .collect();
-            let names = |word: &str| matches!(word.to_uppercase().as_str(), "AXIS" | "ACHSE");
-            // In a sentence "a axis" names none.
-            let axis = |word: &str| {
-                let word = if is_prose {
-                    word.to_owned()
-                } else {
-                    word.to_uppercase()
-                };
-                letter(&word)
-            };
-            words.windows(2).find_map(|two| match two {
-                [name, other] if names(name) && axis(other).is_some() => axis(other),
-                [other, name] if names(name) => axis(other),
-                _ => None,
-            })
-        };
         let column = self.axis_column.as_ref().map(|(_, axis)| *axis);
         column
-            .or_else(|| beside(&self.above, false))
-            .or_else(|| beside(&self.comments, true))
+            .or_else(|| prose::axis(&self.above, false))
+            .or_else(|| prose::axis(&self.comments, true))
     }
 
     /// The axis that is named by the file, the lines above the table, or a column.
@@ -444,7 +423,7 @@ impl Recognised {
         // Of a name of a file a capital alone: `c.csv` is no axis.
         let of_name = || {
             let mut words = stem.split(|letter: char| !letter.is_alphanumeric());
-            words.find_map(letter)
+            words.find_map(prose::letter)
         };
         let of_column = || {
             let read = [Role::Displacement, Role::Deviation, Role::Target];

@@ -80,7 +80,8 @@ pub fn cells(text: &str) -> Result<Cells> {
     let mut passes = file.passes()?;
     let mut remarks = file.one_way(&mut passes);
     let run_count = file.count("RUNS", "run-count")?.map(|(_, n)| n);
-    remarks.extend(laser_passes::leave_out(&mut passes, run_count));
+    let (left_out, n_lost_runs) = laser_passes::leave_out(&mut passes, run_count);
+    remarks.extend(left_out);
     if let Kind::Linear = kind {
         remarks.extend(laser_passes::doubt_unit(&passes));
     }
@@ -115,12 +116,12 @@ pub fn cells(text: &str) -> Result<Cells> {
     }
     let sheet = Sheet {
         lines,
-        separator: None,
-        dates: None,
+        ..Sheet::default()
     };
     Ok(Cells {
         sheet,
         remarks,
+        n_lost_runs,
         start_s: laser_conditions::start_s([
             recorded("date time"),
             file.value("USER-TEXT", "date"),

@@ -14,6 +14,7 @@ use anyhow::{Result, bail};
 use metrology::Axis;
 use metrology::number::number;
 
+use super::lacking;
 use super::limits::Range;
 use super::listed;
 use super::map::{Test, Units, units};
@@ -28,9 +29,6 @@ pub const GRID_MM: f64 = 1e-6;
 
 /// Most runs of a table: a test has some ten, and every one is evaluated.
 pub const MOST_RUNS: usize = 10_000;
-/// Runs and targets that a remark names one by one.
-const NAMED: usize = 10;
-
 /// The runs of a table.
 #[derive(Debug)]
 pub struct Runs {
@@ -96,14 +94,13 @@ fn ordered(test: &Test, table: &Table) -> Result<Runs> {
         is_order_known &= counted.is_order_known;
     }
     remarks.extend(passes::without_readings(&mut runs));
-    // Before passes are paired: with its partner a short one is half a run.
-    remarks.extend(passes::broken_off(&runs));
     remarks.extend(passes::pair(&mut runs));
+    remarks.extend(passes::broken_off(&runs));
     check_directions(&runs, units)?;
     let doubt = listed::doubt(&runs);
     is_order_known &= doubt.is_none();
     remarks.extend(doubt);
-    remarks.extend(check_targets(&runs, units)?);
+    remarks.extend(lacking::check_targets(&runs, units)?);
     Ok(Runs {
         runs,
         remarks,
@@ -313,7 +310,8 @@ pub fn ways(rows: &[Row]) -> Vec<f64> {
     all
 }
 
-const fn word(way: f64) -> &'static str {
+/// A side of approach in words.
+pub const fn word(way: f64) -> &'static str {
     if way > 0.0 { "up" } else { "down" }
 }
 
@@ -337,63 +335,6 @@ fn check_directions(runs: &[Vec<Row>], units: Units) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// A target from one side, comparable from run to run.
-type Visit = (i64, bool);
-
-/// Refuses a target that a run has twice from one side; names those that a run lacks.
-fn check_targets(runs: &[Vec<Row>], units: Units) -> Result<Vec<String>> {
-    let unit = units.target;
-    let mut seen: BTreeMap<Visit, (f64, Vec<usize>)> = BTreeMap::new();
-    for (k, rows) in runs.iter().enumerate() {
-        let mut own: BTreeMap<Visit, u64> = BTreeMap::new();
-        for (row, way) in rows.iter().zip(ways(rows)) {
-            if row.cells[2].is_nan() {
-                // It was stopped at and nothing was read.
-                continue;
-            }
-            let target_mm = row.cells[1];
-            let visit = ((target_mm / GRID_MM).round() as i64, way > 0.0);
-            if let Some(line) = own.insert(visit, row.line) {
-                bail!(
-                    "line {}: run {} has target {target_mm} {unit} {} already in line {line}: give every repetition a number of run of its own",
-                    row.line,
-                    row.cells[0],
-                    word(way)
-                );
-            }
-            seen.entry(visit).or_insert((target_mm, vec![])).1.push(k);
-        }
-    }
-    let (mut remarks, mut others) = (vec![], 0);
-    for ((_, is_up), (target_mm, has)) in seen {
-        let n = runs.len() - has.len();
-        if n == 0 {
-            continue;
-        }
-        if remarks.len() == NAMED {
-            others += 1;
-            continue;
-        }
-        // A run has a target from one side once, and they come in the order of the runs.
-        let lacking = (0..runs.len()).filter(|k| has.binary_search(k).is_err());
-        let named = lacking.take(NAMED);
-        let named: Vec<String> = named.map(|k| runs[k][0].cells[0].to_string()).collect();
-        let more = match n - named.len() {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
-        remarks.push(format!(
-            "target {target_mm} {unit} {} has no row in run {}{more}: an evaluation leaves it out",
-            if is_up { "up" } else { "down" },
-            named.join(", ")
-        ));
-    }
-    if others > 0 {
-        remarks.push(format!("{others} more targets have no row in every run"));
-    }
-    Ok(remarks)
 }
 
 #[cfg(test)]
@@ -554,6 +495,29 @@ mod tests {
             "{words}"
         );
     }
+
+    #[test]
+    fn a_run_that_was_broken_off_is_named_once_and_no_target_for_it() {
+        for n in 1..=4 {
+            for run in [1.0, 2.0, 3.0] {
+                let mut rows = measured();
+                let mut left = n;
+                rows.retain(|row| {
+                    let is_kept = row[0] != run || left > 0;
+                    left -= i32::from(row[0].total_cmp(&run).is_eq() && left > 0);
+                    is_kept
+                });
+                let runs = of(&test(true), &table(&rows, 4)).unwrap();
+                let [said] = &runs.remarks[..] else {
+                    panic!("{:?}", runs.remarks);
+                };
+                let words = format!("{n} readings where a complete run has 6: it was broken off");
+                assert!(said.starts_with(&format!("run {run}, line ")), "{said}");
+                assert!(said.contains(&words), "{said}");
+            }
+        }
+    }
+
     /// Targets to 315 mm in a travel to 320 mm: turned round 5 mm behind the last it is at its end, 6 mm are beyond.
     #[test]
     fn an_overrun_beyond_the_travel_is_refused_with_line_value_limit_and_remedy() {

@@ -33,6 +33,27 @@ fn of_block(cells: &[String]) -> String {
     })
 }
 
+/// Where a column stands.
+pub(super) fn place_of(name: &str, head: &[String], separator: Option<char>) -> Result<usize> {
+    let mut named = head.iter().enumerate().filter(|(_, cell)| *cell == name);
+    let Some((place, _)) = named.next() else {
+        let remedy = match separator {
+            Some(separator) if head.len() == 1 => {
+                format!(" (one column alone: is the separator \"{separator}\"?)")
+            }
+            _ => String::new(),
+        };
+        bail!(
+            "no column \"{name}\"; there are {}{remedy}",
+            head.join(", ")
+        );
+    };
+    if named.next().is_some() {
+        bail!("column \"{name}\" is there twice: rename one of them");
+    }
+    Ok(place)
+}
+
 /// That no names of columns were found; a separator that is not read is named as the reason.
 pub(super) fn no_names(path: &Path) -> String {
     let text = text_file::read(path, Comments::Csv).ok();

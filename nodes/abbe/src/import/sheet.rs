@@ -19,6 +19,8 @@ pub struct Sheet {
     pub separator: Option<char>,
     /// Place of a column of dates that stand before the times of the day of their rows by now.
     pub dates: Option<usize>,
+    /// Comments of a text with their lines, without the sign that begins them.
+    pub comments: Vec<(u64, String)>,
 }
 
 /// The cells of a file, and which of its worksheets they are.
@@ -34,6 +36,8 @@ pub struct Cells {
     pub form: Option<&'static str>,
     /// What an instrument's file says beside its readings.
     pub remarks: Vec<String>,
+    /// Runs of a measurement that an instrument's file lacks or that were broken off.
+    pub n_lost_runs: usize,
     /// When its measurement began, s since 1970, where it says so.
     pub start_s: Option<f64>,
 }
@@ -85,6 +89,7 @@ impl Sheet {
             lines,
             separator: Some(separator),
             dates,
+            comments: comments(text),
         })
     }
 
@@ -108,6 +113,15 @@ impl Sheet {
         }
         best.map(|(k, _)| k)
     }
+}
+
+/// Lines that begin with `#`, with their numbers.
+fn comments(text: &str) -> Vec<(u64, String)> {
+    let lines = (1..).zip(text.lines());
+    let comments = lines.filter_map(|(n, line)| Some((n, line.strip_prefix('#')?)));
+    comments
+        .map(|(n, comment)| (n, comment.trim_matches(['#', ' ', '\t']).to_owned()))
+        .collect()
 }
 
 /// The line of a record; where it was begun to be read, comments and empty lines may stand before it.

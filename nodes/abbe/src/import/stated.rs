@@ -385,7 +385,11 @@ pub fn check_time(name: &str) -> Result<()> {
     }
 }
 
-fn check(column: Column<'_>, stated: &Stated, place: &str) -> Result<()> {
+/// Refuses a column that is read in another unit than a place of the table states.
+///
+/// # Errors
+/// With the column, the place, both units, and what to state.
+pub fn check(column: Column<'_>, stated: &Stated, place: &str) -> Result<()> {
     let Some(wanted) = column.what.unit() else {
         return Ok(());
     };

@@ -11,6 +11,7 @@ use super::limits::Range;
 use super::map::{Column, Direction, Map, Test, What, units};
 use super::measured;
 use super::odd::{Cost, Odd, Read, is_missing};
+use super::prose;
 use super::separators;
 use super::sheet::Sheet;
 use super::stated;
@@ -47,7 +48,7 @@ impl Table {
         let names: Vec<&str> = columns.iter().map(|column| column.name).collect();
         let at = sheet.head(&names).context("no rows")?;
         let (head_line, head) = &sheet.lines[at];
-        let place = |name: &&str| place_of(name, head, sheet.separator);
+        let place = |name: &&str| separators::place_of(name, head, sheet.separator);
         let places: Vec<usize> = names.iter().map(place).collect::<Result<_>>()?;
         let mut left_out = beside::unnamed(head, &places, sheet.dates);
         left_out.extend((at > 0).then(|| {
@@ -64,6 +65,9 @@ impl Table {
             is_clock: false,
             is_whole_clock: false,
         };
+        let below = sheet.lines.get(at + 1).map_or(&[][..], |(_, cells)| cells);
+        let has_units = reader.is_units(below)?;
+        left_out.extend(prose::check(map, sheet, at, has_units)?);
         let mut rows = vec![];
         let (mut n_empty, mut n_rows) = (0_u64, 0);
         for (k, (line, cells)) in sheet.lines.iter().enumerate().skip(at + 1) {
@@ -71,7 +75,7 @@ impl Table {
                 n_empty += 1;
                 continue;
             }
-            if k == at + 1 && reader.is_units(cells)? {
+            if k == at + 1 && has_units {
                 left_out.push(format!("line {line}: units alone"));
                 continue;
             }
@@ -84,7 +88,7 @@ impl Table {
         }
         let odd = std::mem::take(&mut reader.odd).lines(n_rows)?;
         left_out.extend(reader.missing(&rows)?);
-        left_out.extend(reader.doubt(&rows)?);
+        left_out.extend(reader.doubts(&mut rows)?);
         if n_empty > 0 {
             left_out.push(format!("{n_empty} rows: all their cells are empty"));
         }
@@ -177,18 +181,24 @@ impl Reader<'_> {
         Ok(Some(numbers))
     }
 
-    /// What is doubtful about the times of a log.
-    fn doubt(&self, rows: &[Row]) -> Result<Option<String>> {
-        let mut columns = self.columns.iter().filter(|_| !self.is_whole_clock);
+    /// Counts times of the day on over midnight. What was done with the times of a log, and what is doubtful about them.
+    fn doubts(&self, rows: &mut [Row]) -> Result<Vec<String>> {
+        let mut columns = self.columns.iter();
         let Some(place) = columns.position(|column| column.what == What::Time) else {
-            return Ok(None);
+            return Ok(vec![]);
         };
         let name = self.columns[place].name;
-        let times_s: Vec<f64> = rows.iter().map(|row| row.cells[place]).collect();
+        let mut found = vec![];
         if self.is_clock {
-            return clock_parts::of_two_parts(name, &times_s);
+            found.extend(clock_parts::over_midnight(name, place, rows)?);
         }
-        times::of_column(name, &times_s, self.map.units.contains_key(name))
+        let times_s: Vec<f64> = rows.iter().map(|row| row.cells[place]).collect();
+        found.extend(match (self.is_whole_clock, self.is_clock) {
+            (true, _) => None,
+            (_, true) => clock_parts::of_two_parts(name, &times_s)?,
+            _ => times::of_column(name, &times_s, self.map.units.contains_key(name))?,
+        });
+        Ok(found)
     }
 
     /// How many readings are not there.
@@ -248,27 +258,6 @@ fn numbered(row: Row) -> Row {
     let Row { line, mut cells } = row;
     cells.insert(0, 1.0);
     Row { line, cells }
-}
-
-/// Where a column stands.
-fn place_of(name: &str, head: &[String], separator: Option<char>) -> Result<usize> {
-    let mut named = head.iter().enumerate().filter(|(_, cell)| *cell == name);
-    let Some((place, _)) = named.next() else {
-        let remedy = match separator {
-            Some(separator) if head.len() == 1 => {
-                format!(" (one column alone: is the separator \"{separator}\"?)")
-            }
-            _ => String::new(),
-        };
-        bail!(
-            "no column \"{name}\"; there are {}{remedy}",
-            head.join(", ")
-        );
-    };
-    if named.next().is_some() {
-        bail!("column \"{name}\" is there twice: rename one of them");
-    }
-    Ok(place)
 }
 
 /// A number as a person or a program writes it: with a typographic minus, and spaces that mark thousands.

@@ -47,7 +47,7 @@ pub fn of_text(cell: &str) -> Result<Option<f64>> {
     }
     let words = || {
         format!(
-            "\"{}\": must be a time: seconds, 08:15:00, or 2026-01-05 08:15:00",
+            "\"{}\": must be a time: seconds, 08:15:00, or 2026-01-05 08:15:00 (the year with four digits, the month as a number, no name of a zone)",
             shown(cell)
         )
     };

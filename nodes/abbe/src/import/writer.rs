@@ -122,7 +122,7 @@ impl Writer {
         if at < self.at {
             let before_s = (self.at - self.start).as_secs_f64();
             bail!(
-                "{time_s} s after the first row: must not be before the row above, which is at {before_s} s"
+                "{time_s} s after the first row: must not be before the row above, which is at {before_s} s: put the rows in the order of their times"
             );
         }
         self.go_to(at);

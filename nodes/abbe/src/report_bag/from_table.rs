@@ -27,9 +27,16 @@ pub struct FromTable {
     pub lines: Vec<String>,
     /// Cells that cost a row or a reading.
     pub n_odd: usize,
+    /// Runs that the table lacks or that were broken off, and are not in the bag.
+    n_lost_runs: usize,
 }
 
 impl FromTable {
+    /// Whether all that was measured is in the bag.
+    pub const fn is_whole(&self) -> bool {
+        self.n_odd == 0 && self.n_lost_runs == 0
+    }
+
     /// What was assumed of columns, and readings that no machine has.
     pub fn warnings(&self) -> Vec<String> {
         let lines = self.lines.iter();
@@ -111,6 +118,7 @@ fn imported(
         bag,
         lines,
         n_odd: imported.n_odd,
+        n_lost_runs: imported.n_lost_runs,
     })
 }
 

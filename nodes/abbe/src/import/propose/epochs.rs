@@ -1,6 +1,6 @@
 //! Times that count from other days than 1970-01-01, as some programs write them.
 
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use metrology::yaml::shown;
 use metrology::{Host, epoch};
 
@@ -36,7 +36,8 @@ pub fn of_excel(unit: Unit, first: f64) -> Option<f64> {
 /// # Errors
 /// With the cell, where it is no time, or none from which a log has room before 2106.
 pub fn of_first(time: &Known) -> Result<Option<f64>> {
-    let first_s = times::of_text(&time.first)?;
+    let place = || format!("line {}, column \"{}\"", time.first_line, shown(&time.name));
+    let first_s = times::of_text(&time.first).with_context(place)?;
     if let Some(first_s) = first_s {
         check_start(time, first_s)?;
     }

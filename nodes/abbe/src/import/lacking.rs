@@ -1,0 +1,77 @@
+//! Targets that a run of a positioning test lacks, or has twice from one side.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Result, bail};
+
+use super::map::Units;
+use super::passes;
+use super::runs::{GRID_MM, ways, word};
+use super::table::Row;
+
+/// Runs and targets that a remark names one by one.
+const NAMED: usize = 10;
+
+/// A target from one side, comparable from run to run.
+type Visit = (i64, bool);
+
+/// Refuses a target that a run has twice from one side; names those that a run lacks which was not broken off.
+///
+/// # Errors
+/// With both lines.
+pub fn check_targets(runs: &[Vec<Row>], units: Units) -> Result<Vec<String>> {
+    let unit = units.target;
+    let mut seen: BTreeMap<Visit, (f64, Vec<usize>)> = BTreeMap::new();
+    let broken_off = passes::are_broken_off(runs);
+    let whole: Vec<usize> = (0..runs.len()).filter(|k| !broken_off[*k]).collect();
+    for (k, rows) in runs.iter().enumerate() {
+        let mut own: BTreeMap<Visit, u64> = BTreeMap::new();
+        for (row, way) in rows.iter().zip(ways(rows)) {
+            if row.cells[2].is_nan() {
+                // It was stopped at and nothing was read.
+                continue;
+            }
+            let target_mm = row.cells[1];
+            let visit = ((target_mm / GRID_MM).round() as i64, way > 0.0);
+            if let Some(line) = own.insert(visit, row.line) {
+                bail!(
+                    "line {}: run {} has target {target_mm} {unit} {} already in line {line}: give every repetition a number of run of its own",
+                    row.line,
+                    row.cells[0],
+                    word(way)
+                );
+            }
+            if !broken_off[k] {
+                seen.entry(visit).or_insert((target_mm, vec![])).1.push(k);
+            }
+        }
+    }
+    let (mut remarks, mut others) = (vec![], 0);
+    for ((_, is_up), (target_mm, has)) in seen {
+        let n = whole.len() - has.len();
+        if n == 0 {
+            continue;
+        }
+        if remarks.len() == NAMED {
+            others += 1;
+            continue;
+        }
+        // A run has a target from one side once, and they come in the order of the runs.
+        let lacking = whole.iter().filter(|k| has.binary_search(k).is_err());
+        let named = lacking.take(NAMED);
+        let named: Vec<String> = named.map(|k| runs[*k][0].cells[0].to_string()).collect();
+        let more = match n - named.len() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        remarks.push(format!(
+            "target {target_mm} {unit} {} has no row in run {}{more}: an evaluation leaves it out",
+            if is_up { "up" } else { "down" },
+            named.join(", ")
+        ));
+    }
+    if others > 0 {
+        remarks.push(format!("{others} more targets have no row in every run"));
+    }
+    Ok(remarks)
+}
