@@ -60,7 +60,7 @@ impl Add {
                 Ok(whole) => is_whole &= whole,
                 Err(error) => {
                     n_failed += 1;
-                    complain!("abbe: {}: {}", path.display(), complaint::in_words(&error));
+                    complain!("abbe: {}", named_once(path, &complaint::in_words(&error)));
                 }
             }
         }
@@ -152,5 +152,43 @@ impl Add {
             complain!("abbe: {run}");
         }
         Ok(is_whole && tests.is_whole())
+    }
+}
+
+/// What is wrong with an input, with its path once.
+fn named_once(path: &Path, said: &str) -> String {
+    let path = path.display().to_string();
+    if said.starts_with(&path) {
+        said.to_owned()
+    } else {
+        format!("{path}: {said}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_no_json_is_named_once_with_line_column_and_remedy() {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("report.json");
+        for (text, place) in [
+            ("{\"a\": NaN}", "line 1, column 7"),
+            ("{\n\"a\": 1,\n}", "line 3, column 1"),
+            ("hello", "line 1, column 1"),
+            ("", "line 1, column 0"),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let error = json(&path).unwrap_err();
+            let said = named_once(&path, &complaint::in_words(&error));
+            let name = path.display().to_string();
+            assert_eq!(said.matches(&name).count(), 1, "{said}");
+            for words in [place, ": is no JSON (", "abbe report --json"] {
+                assert!(said.contains(words), "{said}");
+            }
+        }
+        let other = named_once(&path, "names no machine");
+        assert_eq!(other, format!("{}: names no machine", path.display()));
     }
 }

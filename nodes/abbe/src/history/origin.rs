@@ -226,7 +226,17 @@ pub fn json(path: &Path) -> Result<(String, Value)> {
     let text = text_file::read(path, text_file::Comments::None)?;
     match serde_json::from_str(&text) {
         Ok(value) => Ok((text, value)),
-        Err(error) => bail!("{}:{error}", path.display()),
+        Err(error) => {
+            let (line, column) = (error.line(), error.column());
+            let said = error.to_string();
+            let reason = said
+                .rsplit_once(" at line ")
+                .map_or("", |(reason, _)| reason);
+            bail!(
+                "{}: line {line}, column {column}: is no JSON ({reason}): write it anew with abbe report --json",
+                path.display()
+            )
+        }
     }
 }
 

@@ -139,7 +139,29 @@ impl Figure {
             let figure = self.name.clone();
             return Err(HistoryError::BadUncertainty { figure, value });
         }
-        Ok(())
+        self.check_error()
+    }
+
+    /// Refuses an error that no machine has, and a range below zero.
+    fn check_error(&self) -> Result<(), HistoryError> {
+        let mut bounds = bound::ERRORS.iter();
+        let Some((_, greatest)) = bounds.find(|(unit, _)| *unit == self.unit) else {
+            return Ok(());
+        };
+        let last = self.name.rsplit('.').next().unwrap_or_default();
+        let is_range = bound::NEVER_NEGATIVE.contains(&last);
+        let least = if is_range { 0.0 } else { -greatest };
+        if (least..=*greatest).contains(&self.value) {
+            return Ok(());
+        }
+        Err(HistoryError::NoFigure {
+            test: self.test.clone(),
+            figure: self.name.clone(),
+            value: self.value,
+            unit: self.unit.clone(),
+            least,
+            greatest: *greatest,
+        })
     }
 }
 
@@ -173,4 +195,87 @@ fn check_hash(key: &'static str, text: &str) -> Result<(), HistoryError> {
         key,
         text: text.chars().take(70).collect(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figure(name: &str, value: f64, unit: &str) -> Figure {
+        Figure {
+            test: "Positioning X".to_owned(),
+            name: name.to_owned(),
+            value,
+            unit: unit.to_owned(),
+            ..crate::report_figures::empty()
+        }
+    }
+
+    #[test]
+    fn figures_that_no_machine_has_are_refused_with_key_value_and_limits() {
+        for (name, value, unit, words) in [
+            (
+                "iso230_2.accuracy",
+                -1.0,
+                "mm",
+                "= -1 mm: must be from 0 to 1000 mm",
+            ),
+            (
+                "iso230_2.up.repeatability",
+                -1e-6,
+                "mm",
+                "must be from 0 to 1000 mm",
+            ),
+            ("iso230_2.reversal", -0.002, "mm", "must be from 0 to"),
+            (
+                "iso230_3_log.figures.range",
+                -0.01,
+                "mm",
+                "must be from 0 to",
+            ),
+            (
+                "iso230_2.accuracy",
+                24_510.0,
+                "mm",
+                "= 24510 mm: must be from 0 to 1000 mm",
+            ),
+            (
+                "iso230_2.mean_reversal",
+                -1_001.0,
+                "mm",
+                "must be from -1000 to 1000 mm",
+            ),
+            (
+                "iso230_2_rotary.figures.both.accuracy",
+                -1e-5,
+                "rad",
+                "must be from 0 to",
+            ),
+            (
+                "iso230_2_rotary.figures.both.mean_reversal",
+                7.0,
+                "rad",
+                "must be from -6.28",
+            ),
+        ] {
+            let refused = figure(name, value, unit)
+                .check()
+                .expect_err(name)
+                .to_string();
+            assert!(
+                refused.starts_with(&format!("Positioning X: {name} = ")),
+                "{refused}"
+            );
+            assert!(refused.contains(words), "{refused}");
+        }
+        for (name, value, unit) in [
+            ("iso230_2.accuracy", 0.0, "mm"),
+            ("iso230_2.mean_reversal", -0.005, "mm"),
+            ("iso230_4.clockwise.least_radial_deviation", -0.003, "mm"),
+            ("effect.lead.um_per_m", -5_000.0, "um/m"),
+            ("latency_s", 0.002, "s"),
+        ] {
+            assert!(figure(name, value, unit).check().is_ok(), "{name}");
+        }
+    }
 }

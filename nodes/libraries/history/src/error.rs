@@ -233,6 +233,27 @@ pub enum HistoryError {
         /// The limit.
         greatest: f64,
     },
+    /// A figure below zero that is never below it, or larger than any of a machine.
+    #[error(
+        "{test}: {figure} = {value} {unit}: must be from {least} to {greatest} {unit}: measure again, or correct the report",
+        value = number(*value),
+        least = number(*least),
+        greatest = number(*greatest)
+    )]
+    NoFigure {
+        /// Title of its test.
+        test: String,
+        /// Name of the figure.
+        figure: String,
+        /// Its value.
+        value: f64,
+        /// Its unit.
+        unit: String,
+        /// Least value.
+        least: f64,
+        /// Greatest value.
+        greatest: f64,
+    },
     /// An uncertainty below zero.
     #[error("{figure}: standard_uncertainty = {value}: must not be below 0", value = number(*value))]
     BadUncertainty {

@@ -204,7 +204,7 @@ mod tests {
             vec![known, figure("gap.rms", -value, None)]
         };
         for (machine, at_s) in [("fräse", 2_000), ("b", 1_000), ("fräse", 4_294_967_295)] {
-            let one = entry(machine, at_s, of(at_s as f64 * 1e-6));
+            let one = entry(machine, at_s, of(at_s as f64 * 1e-8));
             store.add(&one).unwrap();
         }
         let made = super::of(&store, &SeriesKey::default(), Window::ALL).unwrap();
@@ -234,7 +234,7 @@ mod tests {
         ];
         assert_eq!(texts, wanted);
         assert_eq!(row.get_timestamp_millis(5).unwrap(), 4_294_967_295_000);
-        assert!((row.get_double(6).unwrap() - 4_294.967_295).abs() < 1e-12);
+        assert!((row.get_double(6).unwrap() - 42.949_672_95).abs() < 1e-12);
         assert!((row.get_double(7).unwrap() - 0.001).abs() < 1e-15);
         // Without an uncertainty there is none, and not zero.
         assert_eq!(rows[0].get_string(2).unwrap(), "gap.rms");
