@@ -303,12 +303,14 @@ impl ImportShift {
             return;
         }
         let log = self.log.display();
-        let covered: Vec<String> = shift.covered.iter().map(between).collect();
-        complain!(
-            "{log}: of {}, the log tells of {}",
-            between(&(order.from, order.to)),
-            covered.join(", ")
-        );
+        if !shift.is_covered {
+            let covered: Vec<String> = shift.covered.iter().map(between).collect();
+            complain!(
+                "{log}: of {}, the log covers {}",
+                between(&(order.from, order.to)),
+                covered.join(", ")
+            );
+        }
         for leap in shift.leaps.iter().take(LEAPS_SHOWN) {
             let (from, to) = (words(leap.from), words(leap.to));
             complain!("{log}: the machine's clock leaps from {from} to {to}");

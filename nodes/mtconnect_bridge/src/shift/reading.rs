@@ -46,6 +46,8 @@ pub struct Shift {
     pub not_followed: Vec<String>,
     /// Spans of the range, longer than a line of the programs, in which the log has no line: its last values hold.
     pub silent: Vec<(Stamp<Machine>, Stamp<Machine>)>,
+    /// Whether the log reaches over the whole range.
+    pub is_covered: bool,
     /// Whether nothing is missing that would change the programs.
     pub is_whole: bool,
 }
@@ -266,10 +268,12 @@ pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, 
     let is_covered = (order.to - order.from).as_secs_f64() - covered_s < order.bin_s;
     let account = reader.account;
     let bin = Span::from_secs_f64(order.bin_s);
+    let is_known = reader.silent.is_empty() && without_spindle.is_empty() && without_position.is_empty();
     Ok(Shift {
         doubtful: reader.cutter.speeds.doubtful(bin),
         bins: reader.cutter.bins,
-        is_whole: is_covered && leaps.is_empty() && account.is_whole(),
+        is_covered,
+        is_whole: is_covered && is_known && leaps.is_empty() && account.is_whole(),
         without_spindle,
         without_position,
         not_followed,

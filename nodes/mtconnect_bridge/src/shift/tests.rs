@@ -98,6 +98,23 @@ fn times_without_a_position_and_positions_that_are_not_followed_are_named() {
     let wanted = vec![(Axis::X, vec![[6.0, 22.0]]), (Axis::Y, vec![[0.0, 30.0]])];
     assert_eq!(found, wanted);
     assert_eq!(shift.not_followed, ["Babs"]);
+    assert!(!shift.is_whole && shift.is_covered);
+}
+
+/// By hand: a line every second, but for a hole; one of two minutes at most is a machine that changed nothing.
+#[test]
+fn a_log_with_a_hole_is_not_whole_and_covers_its_range() {
+    let mut order = order();
+    order.to = order.from + Span::from_secs_f64(1200.0);
+    for (hole_s, is_whole) in [(0, true), (60, true), (119, true), (130, false), (600, false)] {
+        let at = |s: i64| words(order.from + Span::from_secs_f64(s as f64));
+        let seconds = (0..=1200).filter(|s| *s <= 300 || *s > 300 + hole_s);
+        let lines = seconds.map(|s| format!("{}|Srpm|600|Xabs|{}\n", at(s), s % 7));
+        let log: String = lines.collect();
+        let shift = bins(log.as_bytes(), &mapping(), &order).unwrap();
+        assert_eq!((shift.is_whole, shift.is_covered), (is_whole, true), "{hole_s} s");
+        assert_eq!(shift.silent.is_empty(), is_whole, "{hole_s} s");
+    }
 }
 
 #[test]
@@ -191,7 +208,8 @@ fn a_log_that_has_a_part_of_the_shift_alone_says_which() {
     let whole = "2016-11-29T10:00:00Z 2016-11-29T10:00:22Z".to_owned();
     let stands = LOG.join("\n").replace("Srpm|UNAVAILABLE", "Srpm|0");
     assert_eq!(missing(&stands), (true, vec![whole.clone()], 0));
-    assert_eq!(missing(&LOG.join("\n")), (true, vec![whole], 0));
+    // No speed from 20 s on.
+    assert_eq!(missing(&LOG.join("\n")), (false, vec![whole], 0));
     // It ends early.
     let part = "2016-11-29T10:00:00Z 2016-11-29T10:00:06Z".to_owned();
     assert_eq!(missing(&LOG[..4].join("\n")), (false, vec![part], 0));
