@@ -52,7 +52,7 @@ impl Counting {
     pub fn zero(&self, axis: Axis, (first, last): (f64, f64)) -> String {
         if !self.relative_to_reference {
             return format!(
-                "errors of {axis} are not counted from the reference point (--absolute): there may be one at it"
+                "errors of {axis} are not counted from the reference point (--absolute): nothing is taken out so that they are 0 there"
             );
         }
         let wanted = self.reference[axis];

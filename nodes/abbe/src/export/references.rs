@@ -127,15 +127,29 @@ impl Means<'_> {
     }
 
     /// From what the deviations are counted: what is added to them, and its words.
-    fn zero(&self) -> (f64, &'static str) {
+    fn zero(&self) -> (f64, String) {
         let is_linear = self.axis.is_linear();
         if self.mean.abs() <= SAME_ZERO[usize::from(!is_linear)] {
-            return (self.mean, "as read");
+            let said = format!(
+                "as read (their mean, {}, is in them: pages of abbe report take it out)",
+                self.in_words()
+            );
+            return (self.mean, said);
         }
-        (
-            0.0,
-            "counted from the mean of all, for the reference was zeroed at another place than the axis,",
-        )
+        let said = format!(
+            "counted from the mean of all, {}, which is taken out: the reference was zeroed at another place than the axis,",
+            self.in_words()
+        );
+        (0.0, said)
+    }
+
+    /// The mean of all deviations with its unit.
+    fn in_words(&self) -> String {
+        if self.axis.is_linear() {
+            format!("{:+.3} um", self.mean * 1e3)
+        } else {
+            format!("{:+.2} arcsec", self.mean.to_degrees() * 3600.0)
+        }
     }
 }
 
@@ -223,7 +237,7 @@ mod tests {
             "{table:?}"
         );
         assert!(
-            said.ends_with("as read and not corrected to 20 °C"),
+            said.ends_with("as read (their mean, -1.600 um, is in them: pages of abbe report take it out) and not corrected to 20 °C"),
             "{said}"
         );
         // The laser counts from the begin of the travel.
@@ -231,7 +245,8 @@ mod tests {
         let (table, said) = of_linear(&one).unwrap();
         assert!((table.deviation_up[0] - 0.002).abs() < 1e-12, "{table:?}");
         assert!(
-            said.contains("counted from the mean of all") && !said.contains("as read"),
+            said.contains("counted from the mean of all, +280000.000 um, which is taken out")
+                && !said.contains("as read"),
             "{said}"
         );
     }
