@@ -268,7 +268,8 @@ pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, 
     let is_covered = (order.to - order.from).as_secs_f64() - covered_s < order.bin_s;
     let account = reader.account;
     let bin = Span::from_secs_f64(order.bin_s);
-    let is_known = reader.silent.is_empty() && without_spindle.is_empty() && without_position.is_empty();
+    let is_known =
+        reader.silent.is_empty() && without_spindle.is_empty() && without_position.is_empty();
     Ok(Shift {
         doubtful: reader.cutter.speeds.doubtful(bin),
         bins: reader.cutter.bins,

@@ -106,13 +106,23 @@ fn times_without_a_position_and_positions_that_are_not_followed_are_named() {
 fn a_log_with_a_hole_is_not_whole_and_covers_its_range() {
     let mut order = order();
     order.to = order.from + Span::from_secs_f64(1200.0);
-    for (hole_s, is_whole) in [(0, true), (60, true), (119, true), (130, false), (600, false)] {
+    for (hole_s, is_whole) in [
+        (0, true),
+        (60, true),
+        (119, true),
+        (130, false),
+        (600, false),
+    ] {
         let at = |s: i64| words(order.from + Span::from_secs_f64(s as f64));
         let seconds = (0..=1200).filter(|s| *s <= 300 || *s > 300 + hole_s);
         let lines = seconds.map(|s| format!("{}|Srpm|600|Xabs|{}\n", at(s), s % 7));
         let log: String = lines.collect();
         let shift = bins(log.as_bytes(), &mapping(), &order).unwrap();
-        assert_eq!((shift.is_whole, shift.is_covered), (is_whole, true), "{hole_s} s");
+        assert_eq!(
+            (shift.is_whole, shift.is_covered),
+            (is_whole, true),
+            "{hole_s} s"
+        );
         assert_eq!(shift.silent.is_empty(), is_whole, "{hole_s} s");
     }
 }
