@@ -272,6 +272,17 @@ pub struct StylusEntry {
     pub radius_mm: f64,
     /// Distance from the spindle nose to the ball centre.
     pub length_mm: f64,
+    /// Length of the stylus itself, from its seat in the probe to the ball centre, by which it bends; where absent, `length_mm`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stem_length_mm: Option<f64>,
+}
+
+impl StylusEntry {
+    /// The length that bends under the triggering force.
+    #[must_use]
+    pub fn bending_length_mm(&self) -> f64 {
+        self.stem_length_mm.unwrap_or(self.length_mm)
+    }
 }
 
 /// A reference block: three orthogonal faces that meet in a corner.

@@ -105,7 +105,30 @@ pub fn of_diagnosis(
         used.insert("probe.mounted".to_owned());
         used.extend(of_styli(Some(machine), "length_mm"));
     }
-    among(left_out, &used)
+    let mut found = among(left_out, &used);
+    if names(report, "probe_pretravel", "") {
+        found.extend(stems(machine, session));
+    }
+    found
+}
+
+/// Lengths that stand for those of the stems, where runs had styli of more than one length.
+fn stems(machine: &MachineFile, session: &Session) -> Vec<String> {
+    let touched = session.runs.iter().filter(|run| !run.touches.is_empty());
+    let names: BTreeSet<&str> = touched.map(|run| run.segment.stylus.as_str()).collect();
+    let used =
+        machine.probe.styli.iter().filter(|(name, stylus)| {
+            names.contains(name.as_str()) && stylus.stem_length_mm.is_none()
+        });
+    let stems = used.map(|(name, stylus)| {
+        format!(
+            "probe.styli.{name}.stem_length_mm = length_mm = {}",
+            stylus.length_mm
+        )
+    });
+    Some(stems.collect())
+        .filter(|stems: &Vec<String>| stems.len() > 1)
+        .unwrap_or_default()
 }
 
 /// A sentence that names the defaults in use; `None` without defaults.

@@ -1,12 +1,12 @@
 //! What must hold in a machine file beyond its syntax.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use metrology::{Axis, Bound, leaves};
 
 use super::{
     ArtefactEntry, AxisEntry, BlockEntry, LinearAxisEntry, MachineFile, PositionFeedback,
-    effect_ranges, limits, reference,
+    StylusEntry, effect_ranges, limits, reference,
 };
 use crate::chain::Chain;
 use crate::cycle::artefact_id;
@@ -272,9 +272,24 @@ impl Check<'_> {
         for name in probe.styli.keys() {
             self.ros_name(&format!("probe.styli.{name}"), name)?;
         }
+        self.stems(&probe.styli)?;
         let known = probe.styli.contains_key(&probe.mounted);
         let rule = "must be one of probe.styli";
         self.name("probe.mounted", &probe.mounted, known, rule)
+    }
+
+    /// Stems are compared with one another, so each stylus states its own or none does.
+    fn stems(&self, styli: &BTreeMap<String, StylusEntry>) -> Result<(), MachineFileError> {
+        let is_any = styli.values().any(|one| one.stem_length_mm.is_some());
+        for (name, stylus) in styli.iter().filter(|_| is_any) {
+            let key = format!("probe.styli.{name}.stem_length_mm");
+            let Some(stem_mm) = stylus.stem_length_mm else {
+                return self.name(&key, "", false, "must be given of each stylus or of none");
+            };
+            let rule = "must be at most length_mm, which reaches from the spindle nose to the ball";
+            self.number(&key, stem_mm, stem_mm <= stylus.length_mm, rule)?;
+        }
+        Ok(())
     }
 
     fn features(&self, file: &MachineFile) -> Result<(), MachineFileError> {

@@ -48,6 +48,7 @@ impl Default for ProbeEntry {
         let stylus = StylusEntry {
             radius_mm: 3.0,
             length_mm: 150.0,
+            stem_length_mm: None,
         };
         Self {
             styli: BTreeMap::from([(STYLUS.to_owned(), stylus)]),

@@ -41,6 +41,7 @@ pub(super) const ROWS: &[Row] = &[
     ("radius_mm", 1e-3, HALL_MM),
     ("nose_radius_mm", 0.01, 1e4),
     ("length_mm", 0.01, 1e4),
+    ("stem_length_mm", 0.01, 1e4),
     ("standoff_mm", 1e-3, 1e3),
     ("overtravel_mm", 1e-3, 1e3),
     ("feed_mm_min", 0.01, 1e5),

@@ -162,6 +162,28 @@ fn numbers_outside_their_range_are_named_with_value_and_rule() {
 }
 
 #[test]
+fn the_stem_of_a_stylus_is_given_of_each_or_of_none_and_ends_at_the_nose() {
+    let long = "length_mm: 150.0, stem_length_mm: 160.0";
+    assert_eq!(
+        unplaced(&refusal("length_mm: 150.0", long)),
+        "m.yaml: probe.styli.ruby_6.stem_length_mm = 160 mm: must be at most length_mm, which reaches from the spindle nose to the ball"
+    );
+    let other =
+        "length_mm: 150.0, stem_length_mm: 50.0}, ruby_2: {radius_mm: 1.0, length_mm: 150.0";
+    assert_eq!(
+        unplaced(&refusal("length_mm: 150.0", other)),
+        "m.yaml: probe.styli.ruby_2.stem_length_mm = \"\": must be given of each stylus or of none"
+    );
+    let both = BENCH.replacen(
+        "length_mm: 150.0",
+        "length_mm: 150.0, stem_length_mm: 50.0",
+        1,
+    );
+    let file = MachineFile::parse(&both, "m.yaml").unwrap();
+    assert!((file.probe.styli["ruby_6"].bending_length_mm() - 50.0).abs() < 1e-12);
+}
+
+#[test]
 fn names_that_refer_to_nothing_or_break_ros_rules_are_refused() {
     let cases = [
         (

@@ -22,7 +22,7 @@
 //! |---|---|---|
 //! | p_l, p_a | `lateral_um` with the mounted stylus, `axial_um` | µm |
 //! | e | `length_exponent` | 1 |
-//! | L, L_m | length of the stylus of the run and of the mounted one | mm |
+//! | L, L_m | `stem_length_mm` of the stylus of the run and of the mounted one, else `length_mm` | mm |
 //! | b | `free_x_um`, `free_y_um`, `free_z_um` | µm |
 //! | c | `free_slant_um`, at 45 degrees | µm |
 //!
@@ -96,7 +96,7 @@ impl Effect for ProbePretravel {
 pub(super) fn length_ratio(scene: &Scene<'_>, run: &Run) -> f64 {
     let of_run = scene.machine.probe.styli.get(&run.segment.stylus);
     match (of_run, scene.machine.mounted_stylus()) {
-        (Some(of_run), Some(mounted)) => of_run.length_mm / mounted.length_mm,
+        (Some(of_run), Some(mounted)) => of_run.bending_length_mm() / mounted.bending_length_mm(),
         _ => 1.0,
     }
 }

@@ -22,6 +22,7 @@ fn val_probe_pretravel_cantilever() {
     let stylus = |length_mm| StylusEntry {
         radius_mm: 3.0,
         length_mm,
+        stem_length_mm: None,
     };
     machine.probe.styli = [("short", 50.0), ("long", 100.0)]
         .map(|(name, length_mm)| (String::from(name), stylus(length_mm)))
@@ -45,6 +46,31 @@ fn val_probe_pretravel_cantilever() {
         println!("{name}: {seen} mm, {off:.1e} off");
         assert!(off.abs() < 1e-6, "{name}: {off}");
     }
+}
+
+/// Stems of 50 and 100 mm in holders of 140 mm: the stems bend, the holders do not.
+#[test]
+fn val_probe_pretravel_of_stems_in_long_holders() {
+    let mut machine = bench();
+    for (name, length_mm, stem_mm) in [("short", 190.0, 50.0), ("long", 240.0, 100.0)] {
+        let stylus = StylusEntry {
+            radius_mm: 3.0,
+            length_mm,
+            stem_length_mm: Some(stem_mm),
+        };
+        machine.probe.styli.insert(String::from(name), stylus);
+    }
+    machine.probe.mounted = String::from("short");
+    let given = [
+        ("lateral_um", bending_mm(50.0) * 1e3),
+        ("axial_um", 0.0),
+        ("length_exponent", 3.0),
+    ];
+    let mut run = touching(vec![touch(0.0, [0.0; 3], Vector3::x(), 2.0)]);
+    run.segment.stylus = String::from("long");
+    let seen = predict(&machine, &History::default(), &run, ID, &given)[0];
+    let off = seen / bending_mm(100.0) - 1.0;
+    assert!(off.abs() < 1e-6, "{seen} mm, {off}");
 }
 
 #[test]

@@ -19,6 +19,7 @@ fn val_probe_repeatability_seat_and_lever() {
     let long = StylusEntry {
         radius_mm: 3.0,
         length_mm: 225.0,
+        stem_length_mm: None,
     };
     machine.probe.styli.insert(String::from("long"), long);
     // The seat settles within 2 urad about X and Y and 0.3 um along the approach; ball 150 or 225 mm below it.
