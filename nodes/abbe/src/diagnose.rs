@@ -5,7 +5,7 @@ use node_runtime::text_file;
 use reports::evaluate::budget::Budget;
 use reports::evaluate::limits::Limits;
 use reports::evaluate::test_conditions::TestConditions;
-use reports::gap::diagnosed::Diagnosed;
+use reports::gap::diagnosed::{Diagnosed, InPlant};
 use reports::loss;
 use reports::machine_defaults;
 use reports::screen::Made;
@@ -390,6 +390,7 @@ fn beside(
         readings: recorded.readings,
         defaults,
         simulated,
+        in_plant: vec![],
         without: config.left_out,
         ablated: config
             .ablated
@@ -424,15 +425,26 @@ fn without_time(paths: &[PathBuf], config: &GapConfig) -> Result<(GapConfig, Opt
     Ok((config, Some(remark)))
 }
 
-/// The diagnosis of a run's own bag as a part of its page, for `explain` as [`gap::page`] has it; without one, why.
+/// The diagnosis of a run's own bag as a part of its page, for `explain` as [`gap::page`] has it; without one, why. `truth`
+/// says of an effect and its axis whether the machine has it, where that is known.
 ///
 /// # Errors
 /// When a plot cannot be drawn or the report not written.
-pub fn of_run(bag: &Path, folder: &Path, machine: &Path, explain: bool) -> Result<Report> {
+pub fn of_run(
+    bag: &Path,
+    folder: &Path,
+    machine: &Path,
+    explain: bool,
+    truth: impl Fn(&str, &str) -> Option<InPlant>,
+) -> Result<Report> {
     let file = text_file::yaml_file(machine).context("machine file")?;
     let name = file.path.display().to_string();
     match of(&[bag.to_owned()], &name, &file.text, &GapConfig::default()) {
-        Ok(diagnosed) => {
+        Ok(mut diagnosed) => {
+            let causes = diagnosed.diagnosis.report.causes.iter();
+            diagnosed.in_plant = causes
+                .filter_map(|cause| truth(&cause.effect, &cause.axis))
+                .collect();
             let json = serde_json::to_string_pretty(&diagnosed.json()?)?;
             let path = folder.join("gap.json");
             whole_file::write(&path, &json)?;

@@ -43,6 +43,7 @@ mod serve;
 mod shortcomings;
 mod simulated_latency;
 mod table_trial;
+mod true_causes;
 mod unwritten;
 
 use serve::ServeOptions;
@@ -258,7 +259,12 @@ impl Run {
         }
         if scenario.file.diagnose && outcome.recorded > 0 {
             let machine = scenario.folder.join("machine.yaml");
-            match diagnose::of_run(&bag, folder, &machine, self.explain) {
+            let plant = true_causes::plant_of(scenario);
+            let truth = |effect: &str, axis: &str| {
+                let plant = plant.as_ref()?;
+                Some(true_causes::truth(plant, effect, axis).in_table())
+            };
+            match diagnose::of_run(&bag, folder, &machine, self.explain, truth) {
                 Ok(gap) => report.join_gap(gap),
                 Err(error) => outcome.fail(format!("{error:#}")),
             }

@@ -4,7 +4,7 @@ use anyhow::Result;
 use gap_diagnosis::report::{Cause, GapReport, NextExperiment, ParameterValue, Status};
 use maud::html;
 
-use diagnosed::Diagnosed;
+use diagnosed::{Diagnosed, InPlant};
 use simulated::Simulated;
 use words::{covariate, in_units, name, name_of, signs};
 
@@ -220,7 +220,7 @@ fn maybe(value: Option<f64>) -> String {
 fn sections(diagnosed: &Diagnosed) -> Vec<Section> {
     let report = &diagnosed.diagnosis.report;
     let all = [
-        causes(report),
+        causes(diagnosed),
         places(diagnosed).ranked(Rank::Detail),
         gap(report).ranked(Rank::Detail),
         held_out(diagnosed),
@@ -243,33 +243,58 @@ fn section(title: &str, names: &[&str], rows: Vec<Vec<String>>, note: &str) -> S
     }
 }
 
-fn causes(report: &GapReport) -> Section {
-    let rows = report.causes.iter().map(|cause| {
-        vec![
+fn causes(diagnosed: &Diagnosed) -> Section {
+    let report = &diagnosed.diagnosis.report;
+    let is_known = !diagnosed.in_plant.is_empty();
+    let rows = report.causes.iter().enumerate().map(|(place, cause)| {
+        let own = [
             name(&cause.effect, &cause.axis),
             status(cause.status).to_owned(),
             format!("{:.2}", cause.confidence),
             three(cause.d),
-            constancy(cause),
-            alike(cause),
-        ]
+        ];
+        let truth = diagnosed.in_plant.get(place);
+        let truth = truth.map(|own| own.has_it.to_owned());
+        let last = [constancy(cause), alike(cause)];
+        own.into_iter().chain(truth).chain(last).collect()
     });
     let names = [
         "effect",
         "status",
         "confidence",
         "D",
+        OF_PLANT,
         "one size under all conditions",
         "could be instead",
     ];
-    let mut section = section(
-        CAUSES,
-        &names,
-        rows.collect(),
-        "D: size over noise, whitened. Below 6.5 nothing is named; in blind trials with other physics nine of ten above 20 are.",
-    );
+    let names: Vec<&str> = { names.into_iter() }
+        .filter(|name| is_known || *name != OF_PLANT)
+        .collect();
+    let note = "D: size over noise, whitened. Below 6.5 nothing is named; in blind trials with other physics nine of ten above 20 are.";
+    let note = format!("{note}{}", parts_of_plant(diagnosed));
+    let mut section = section(CAUSES, &names, rows.collect(), &note);
     section.tables.push(sizes(report));
     section
+}
+
+/// The column of what the simulated machine has.
+const OF_PLANT: &str = "simulated machine has it";
+
+/// The parts of a simulated machine that make what the causes name.
+fn parts_of_plant(diagnosed: &Diagnosed) -> String {
+    let causes = diagnosed.diagnosis.report.causes.iter();
+    let has_part = |(_, own): &(&Cause, &InPlant)| !own.part.is_empty();
+    let parts = causes.zip(&diagnosed.in_plant).filter(has_part);
+    let parts =
+        parts.map(|(cause, own)| format!("{}: {}", name(&cause.effect, &cause.axis), own.part));
+    let parts: Vec<String> = parts.collect();
+    if parts.is_empty() {
+        return String::new();
+    }
+    format!(
+        " Its plant file, which no node reads, has {}.",
+        parts.join("; ")
+    )
 }
 
 /// What is said of a parameter of which the recording tells nothing.

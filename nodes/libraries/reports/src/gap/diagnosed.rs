@@ -8,6 +8,15 @@ use replayer::Reading;
 use super::simulated::Simulated;
 use crate::loss;
 
+/// Whether a simulated machine has what a cause names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InPlant {
+    /// `yes`, `no`, or `not stated`.
+    pub has_it: &'static str,
+    /// Key and value of the part that makes it; empty where there is none.
+    pub part: String,
+}
+
 /// A diagnosis of bags, with what could not be used of them.
 pub struct Diagnosed {
     /// What was found.
@@ -22,6 +31,8 @@ pub struct Diagnosed {
     pub defaults: Vec<String>,
     /// The simulator that the machine was compared with, where it is not the machine file's own.
     pub simulated: Option<Simulated>,
+    /// What the simulated machine has of each cause, in the order of the report; empty where the machine is a real one.
+    pub in_plant: Vec<InPlant>,
     /// Ids of effects that were not considered.
     pub without: Vec<String>,
     /// Ids of rules that were switched off.
