@@ -43,6 +43,8 @@ use crate::shrink::{self, Named, Shrunk};
 
 /// Fewer held-out runs than this are to be looked at one by one.
 const FEW_HELD_OUT: usize = 6;
+/// A gap of so many times the noise is unknown where nothing explains it, whatever the repeats' noise is worth.
+const LEAST_UNKNOWN: f64 = 2.0;
 
 /// What the rms of the held-out runs may be with an effect over what it is without: noise alone changes it by this much.
 const MOST_RATIO: f64 = 1.02;
@@ -85,9 +87,15 @@ pub fn diagnose_against(
     config: &GapConfig,
 ) -> Result<Diagnosis, GapError> {
     let kinds = considered(config)?;
-    prepared(machine, session, quiet, config, |base, notes| {
-        base.diagnosis(&kinds, config, notes)
-    })
+    // A set-up that seems to move again and again may be a machine that grows.
+    let explains = |grown: &Diagnosis| grown.report.does_not_repeat.is_empty();
+    prepared(
+        machine,
+        [session, quiet],
+        config,
+        explains,
+        |base, notes| base.diagnosis(&kinds, config, notes),
+    )
 }
 
 /// The signatures of the catalogue on the runs that a diagnosis is fitted to, before it has found anything.
@@ -106,23 +114,30 @@ pub(crate) fn first_stack<R>(
     machine: &MachineFile,
     session: &Session,
     config: &GapConfig,
-    then: impl FnOnce(&Stack<'_>, &[&'static Kind]) -> R,
+    then: impl Fn(&Stack<'_>, &[&'static Kind]) -> R,
 ) -> Result<R, GapError> {
     let kinds = considered(config)?;
-    prepared(machine, session, session, config, |base, _| {
-        let split = split::split(base.session, config.hold_out);
-        let stack = base.stack(&split.fit, base.noise, &FormError::base(config));
-        then(&stack, &kinds)
-    })
+    prepared(
+        machine,
+        [session; 2],
+        config,
+        |_| false,
+        |base, _| {
+            let split = split::split(base.session, config.hold_out);
+            let stack = base.stack(&split.fit, base.noise, &FormError::base(config));
+            then(&stack, &kinds)
+        },
+    )
 }
 
-/// Takes the residuals and their noise, and goes on with them.
+/// Takes the residuals and their noise, and goes on with them. Where the set-up seems to move, it is taken for one that stands
+/// first; what comes of that holds if it is `enough`.
 fn prepared<R>(
     machine: &MachineFile,
-    session: &Session,
-    quiet: &Session,
+    [session, quiet]: [&Session; 2],
     config: &GapConfig,
-    then: impl FnOnce(&Base<'_>, Vec<Note>) -> R,
+    enough: impl Fn(&R) -> bool,
+    then: impl Fn(&Base<'_>, Vec<Note>) -> R,
 ) -> Result<R, GapError> {
     config.check()?;
     simulate::check(session)?;
@@ -130,16 +145,8 @@ fn prepared<R>(
     let own_noise = std::ptr::eq(session, quiet);
     let chosen = fewer(session, config);
     let session = chosen.as_ref().unwrap_or(session);
-    let chosen = if own_noise {
-        None
-    } else {
-        fewer(quiet, config)
-    };
-    let quiet = if own_noise {
-        session
-    } else {
-        chosen.as_ref().unwrap_or(quiet)
-    };
+    let of_quiet = (!own_noise).then(|| fewer(quiet, config)).flatten();
+    let quiet = of_quiet.as_ref().unwrap_or(quiet);
     let twin = Twin::new(machine)?;
     let residual = residuals(machine, &twin, session)?;
     let all = (0..session.runs.len()).collect::<Vec<_>>();
@@ -150,34 +157,39 @@ fn prepared<R>(
     }
     let of_session = own_noise.then(|| changes_of(session, &rows, &residual, config));
     let changes = of_session.unwrap_or_default();
-    let anew = changes::set_up_anew(session, &changes, config);
-    let session = anew.as_ref().unwrap_or(session);
-    let noise = if own_noise {
-        noise_of(machine, session, stations, &residual, &changes, config)
-    } else {
-        simulate::check(quiet)?;
-        let residual = residuals(machine, &twin, quiet)?;
-        noise_of(machine, quiet, stations, &residual, &[], config)
+    let of_set_up = |session: &Session| -> Result<R, GapError> {
+        let noise = if own_noise {
+            noise_of(machine, session, stations, &residual, &changes, config)
+        } else {
+            simulate::check(quiet)?;
+            let residual = residuals(machine, &twin, quiet)?;
+            noise_of(machine, quiet, stations, &residual, &[], config)
+        };
+        if noise.is_empty() {
+            return Err(no_repeats(session, &rows));
+        }
+        let base = Base {
+            machine,
+            session,
+            twin: &twin,
+            stations,
+            noise: &noise,
+            residual: &residual,
+            listed: listed(machine)?,
+            begins: changes::begins(session, &changes),
+            changes: changes.clone(),
+            floats: vec![],
+            is_of_targets: false,
+        };
+        let base = base.floating(config);
+        let notes = of_begin(&base, &rows, of);
+        Ok(then(&base, notes))
     };
-    if noise.is_empty() {
-        return Err(no_repeats(session, &rows));
-    }
-    let base = Base {
-        machine,
-        session,
-        twin: &twin,
-        stations,
-        noise: &noise,
-        residual: &residual,
-        listed: listed(machine)?,
-        begins: changes::begins(session, &changes),
-        changes,
-        floats: vec![],
-        is_of_targets: false,
+    let Some(anew) = changes::set_up_anew(session, &changes, config) else {
+        return of_set_up(session);
     };
-    let base = base.floating(config);
-    let notes = of_begin(&base, &rows, of);
-    Ok(then(&base, notes))
+    let one = Some(of_set_up(session)?).filter(enough);
+    one.map_or_else(|| of_set_up(&anew), Ok)
 }
 
 /// What a reader should know before anything is searched; `of` runs were recorded.
@@ -283,13 +295,16 @@ impl<'a> Base<'a> {
         let remainder = over_session::remainder(&mut found, &shrunk, config);
         let is_left = remainder.is_some();
         notes.extend(remainder);
-        let flagged = reproduced && before.flagged() && (beside.flagged() || is_left);
+        let gap = gap::table(&all, &sizes, before.flagged());
+        // What is much larger than noise is no noise, also where the floor is not that of the repeats; nothing is named then.
+        let is_large = gap.rms_um >= LEAST_UNKNOWN * gap.floor_um;
+        let flagged = (reproduced || is_large) && before.flagged() && (beside.flagged() || is_left);
         let effects = [found.entries(), scattered.entries()].concat();
         let figures = figures(&stack, &slots, [&before, &beside], &found, &shrunk, config);
         let report = GapReport {
             schema: SCHEMA.to_owned(),
             noise_floor: noise_floor(self.noise, &inflation, config),
-            gap: gap::table(&all, &sizes, before.flagged()),
+            gap,
             r#where: places::places(&stack, &slots, &before.families, &floated),
             causes: [found.causes(), scattered.causes].concat(),
             unknown: unknown::unknown(&stack, &slots, &beside, flagged, &rest),
@@ -320,7 +335,7 @@ impl<'a> Base<'a> {
     ) -> (Vec<OverSession>, Vec<DoesNotRepeat>) {
         let over_session = over_session::of_named(fitted, found, rest, config);
         let left = less(&all.raw, &told(all, found.named(), found));
-        let changes = over_session::not_repeated(all, &left, &self.changes);
+        let changes = over_session::not_repeated(all, &left, &self.changes, found, config);
         (over_session, changes)
     }
 

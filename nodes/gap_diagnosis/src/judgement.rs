@@ -5,6 +5,7 @@
 
 pub(crate) mod along;
 pub(crate) mod aside;
+pub(crate) mod by_clock;
 pub(crate) mod by_thermometer;
 pub(crate) mod cause;
 pub(crate) mod confidence;
@@ -66,6 +67,8 @@ pub enum CheckId {
     WithinStations,
     /// The log goes with a thermometer that drives it.
     OwnThermometer,
+    /// No shift with a temperature explains as much as a drift in time.
+    BeatsHeat,
     /// The noise of the session is that of its repeats.
     NoiseFloor,
     /// No other effect does nearly as well; if one does, the cause is one of a set.
@@ -226,6 +229,10 @@ impl CheckId {
                 "thermometers of its own that the log goes with",
                 Side::AtLeast,
             ),
+            Self::BeatsHeat => (
+                "score lost with a shift by a thermometer in its place",
+                Side::Above,
+            ),
             Self::NoiseFloor => (
                 "variance of the session's noise over that of the repeats",
                 Side::AtMost,
@@ -255,6 +262,7 @@ impl CheckId {
             Self::BeatsShapes => Veto::Shape,
             Self::Needed => Veto::NotNeeded,
             Self::OwnThermometer => Veto::OtherThermometer,
+            Self::BeatsHeat => Veto::Heat,
             Self::NoiseFloor => Veto::NoiseFloor,
             // The first two are of scatter alone, the last makes a set.
             Self::BeatsRuns | Self::WithinStations | Self::NoRival => return None,

@@ -113,6 +113,9 @@ pub struct DoesNotRepeat {
     pub from_run: u32,
     /// Whether nothing else changed than the place of the set-up; a shift of a reference point, which may be named, does the same.
     pub of_set_up: bool,
+    /// Whether it went on evenly, from the first run that shows it (`last_run`) to the last one (`from_run`); absent of a step.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub evenly: bool,
     /// Chance of as much in noise.
     pub chance: f64,
 }

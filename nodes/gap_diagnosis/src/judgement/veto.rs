@@ -13,6 +13,7 @@ use twin::Channel;
 use twin::effects::{self, Parameter, Role};
 
 use crate::config::GapConfig;
+use crate::judgement::by_clock;
 use crate::judgement::cause::{Best, Member, Scope};
 use crate::judgement::confidence::{Rivals, adequacy};
 use crate::judgement::confirm;
@@ -73,6 +74,8 @@ pub enum Veto {
     SmallBesideLeft,
     /// The log goes with other thermometers.
     OtherThermometer,
+    /// A shift with a temperature explains as much.
+    Heat,
     /// The noise is not that of the repeats.
     NoiseFloor,
 }
@@ -102,6 +105,7 @@ impl fmt::Display for Veto {
             Self::OtherThermometer => {
                 f.write_str("no thermometer that the log goes with drives it")
             }
+            Self::Heat => f.write_str("a shift with a temperature explains as much"),
             Self::NoiseFloor => f.write_str("the noise is not that of the repeats"),
         }
     }
@@ -195,6 +199,13 @@ fn checks(
         if !is_closed && !signatures.curves.contains(&instance) {
             checks.push(beside_shapes(scope, signatures, best, place));
         }
+        checks.extend(by_clock::check(
+            scope,
+            signatures,
+            best,
+            place,
+            &others(best, place),
+        ));
         let is_shared = signatures.set_aside_for(instance).next().is_some();
         checks.extend(rivals.checks(&instances, instance, is_shared));
     }
@@ -282,21 +293,21 @@ fn counts_alike(
     alike(&members)
 }
 
-/// Whether no shape without a physics does better in the place of a member.
-fn beside_shapes(scope: &Scope<'_, '_>, signatures: &Library, best: &Best, place: usize) -> Check {
-    let widths = || {
-        best.refit
-            .estimates
-            .iter()
-            .map(|estimate| estimate.active.len())
-    };
-    let first: usize = widths().take(place).sum();
+/// Derivatives of the members beside the one at `place`.
+fn others(best: &Best, place: usize) -> Vec<DVector<f64>> {
+    let estimates = best.refit.estimates.iter();
+    let first: usize = { estimates.take(place).map(|e| e.active.len()) }.sum();
     let own = first..first + best.refit.estimates[place].active.len();
     let columns = best.refit.jacobian.iter().enumerate();
-    let others: Vec<DVector<f64>> = columns
+    columns
         .filter(|(column, _)| !own.contains(column))
         .map(|(_, column)| column.clone())
-        .collect();
+        .collect()
+}
+
+/// Whether no shape without a physics does better in the place of a member.
+fn beside_shapes(scope: &Scope<'_, '_>, signatures: &Library, best: &Best, place: usize) -> Check {
+    let others = others(best, place);
     let cost = Cost {
         price: signatures.forms[best.set[place]].price,
         log_rows: scope.stack.freedom().ln(),

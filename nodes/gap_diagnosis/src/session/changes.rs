@@ -30,6 +30,8 @@
 //! # References
 //! \[1\] E. S. Page, Biometrika 42, 1955 (change at an unknown point). \[2\] J. Bai, P. Perron, Econometrica 66, 1998 (several).
 
+pub mod evenly;
+
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
@@ -118,7 +120,7 @@ pub fn left(session: &Session, rows: &Rows, rest: &[f64], changes: &[Change]) ->
 }
 
 /// Id of the effect that is as a set-up that moves once.
-const MOVES_ONCE: &str = "homing_shift";
+pub(crate) const MOVES_ONCE: &str = "homing_shift";
 
 /// The session with a set-up of its own between steps at which the set-up moved; none where it did not, or only once and an
 /// effect that is considered may have that.
@@ -431,7 +433,7 @@ mod tests {
     use super::*;
 
     /// Runs of two tests in turn, ten patterns each; `of` gives what changes in the first pattern.
-    fn drawn(seed: u64, runs: usize, of: impl Fn(usize) -> f64) -> Vec<Series> {
+    pub(super) fn drawn(seed: u64, runs: usize, of: impl Fn(usize) -> f64) -> Vec<Series> {
         let mut random = Pcg64Mcg::seed_from_u64(seed);
         let mut pattern = |k: usize| Series {
             channel: Channel::GridU,

@@ -27,7 +27,7 @@ use crate::report::{DoesNotRepeat, OverSession, Status};
 use crate::search::nuisance::orthonormal;
 use crate::search::rows::count;
 use crate::search::signature::begin_s;
-use crate::session::changes::{self, Change};
+use crate::session::changes::{self, Change, evenly};
 use crate::shrink::Shrunk;
 
 /// Chance in noise above which one size holds.
@@ -197,26 +197,44 @@ fn judged(session: &Session, sizes: &[Sized], config: &GapConfig) -> OverSession
 
 /// The changes that the named effects do not explain, and those that are no other than a set-up that moved; `rest` is what the
 /// effects leave of the rows of all runs, mm.
-pub(crate) fn not_repeated(stack: &Stack<'_>, rest: &[f64], all: &[Change]) -> Vec<DoesNotRepeat> {
+pub(crate) fn not_repeated(
+    stack: &Stack<'_>,
+    rest: &[f64],
+    all: &[Change],
+    found: &Found,
+    config: &GapConfig,
+) -> Vec<DoesNotRepeat> {
     let sizes_mm = changes::left(stack.session, &stack.rows, rest, all);
     let number = |run: usize| stack.session.runs[run].segment.run;
+    // A shift of a reference point is what a set-up that moved makes as well; no other effect is.
+    let is_shift = |member: &Member| found.instance(member).kind.id == changes::MOVES_ONCE;
+    let has_shift = found.named().any(is_shift);
     let size_mm = |change: &Change, left_mm: f64| {
         if left_mm > MOST_LEFT * change.size_mm {
             return Some(left_mm);
         }
-        change.is_set_up.then_some(change.size_mm)
+        (change.is_set_up && has_shift).then_some(change.size_mm)
     };
-    let left = all.iter().zip(sizes_mm);
-    left.filter_map(|(change, left_mm)| Some((change, size_mm(change, left_mm)?)))
-        .map(|(change, size_mm)| DoesNotRepeat {
-            channel: change.channel.to_string(),
-            size_um: 1e3 * size_mm,
-            last_run: number(change.between[0]),
-            from_run: number(change.between[1]),
-            of_set_up: change.is_set_up,
-            chance: change.chance,
-        })
-        .collect()
+    let of = |change: &Change, size_mm: f64, evenly: bool| DoesNotRepeat {
+        channel: change.channel.to_string(),
+        size_um: 1e3 * size_mm,
+        last_run: number(change.between[0]),
+        from_run: number(change.between[1]),
+        of_set_up: change.is_set_up,
+        evenly,
+        chance: change.chance,
+    };
+    let steps = all.iter().zip(sizes_mm);
+    let steps = steps.filter_map(|(change, left_mm)| Some((change, size_mm(change, left_mm)?)));
+    let mut told: Vec<DoesNotRepeat> = steps
+        .map(|(change, size_mm)| of(change, size_mm, false))
+        .collect();
+    // What a step leaves beside an effect that explains it pulls a slope with it.
+    if all.is_empty() {
+        let evenly = evenly::find(stack.session, &stack.rows, rest, config);
+        told.extend(evenly.iter().map(|change| of(change, change.size_mm, true)));
+    }
+    told
 }
 
 /// Says what changed where a page lists remarks.
@@ -241,6 +259,7 @@ pub(crate) fn notes(named: &[OverSession], changed: &[DoesNotRepeat]) -> Vec<Not
         size_um: own.size_um,
         runs: [own.last_run, own.from_run],
         of_set_up: own.of_set_up,
+        evenly: own.evenly,
         chance: own.chance,
     });
     begun

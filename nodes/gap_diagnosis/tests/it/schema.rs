@@ -29,7 +29,8 @@ const FULL: &str = r#"{
 "next_experiments": [{"run": "", "separates": [""], "delta": 31.0, "minutes": 1.5}],
 "over_session": [{"effect": "backlash", "axis": "X", "from_run": 25, "holds": false, "changes_from_run": 31, "change_share": 0.2,
   "growth_share_per_h": 0.1, "chance": 0.001}],
-"does_not_repeat": [{"channel": "radial", "size_um": 5.0, "last_run": 3, "from_run": 4, "of_set_up": true, "chance": 1e-6}],
+"does_not_repeat": [{"channel": "radial", "size_um": 5.0, "last_run": 3, "from_run": 4, "of_set_up": true,
+  "evenly": true, "chance": 1e-6}],
 "runtime_s": 1.3 }"#;
 
 /// What `abbe diagnose` adds to a report, where there is any.
@@ -62,7 +63,7 @@ const SAMPLE: &str = r#"{ "schema": "abbe.gap/1",
   "runtime_s": 1.3 }"#;
 
 /// Keys that a report need not have, with their place.
-const OPTIONAL: [(&str, &str); 8] = [
+const OPTIONAL: [(&str, &str); 9] = [
     ("report", "over_session"),
     ("report", "does_not_repeat"),
     ("report", "loss"),
@@ -71,6 +72,7 @@ const OPTIONAL: [(&str, &str); 8] = [
     ("report", "made_with"),
     ("report", "alarms"),
     ("report.causes[]", "why"),
+    ("report.does_not_repeat[]", "evenly"),
 ];
 
 /// Lists without an entry: of them nothing would be compared.

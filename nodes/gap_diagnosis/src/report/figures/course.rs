@@ -23,6 +23,8 @@ pub enum Course {
         size_um: f64,
         runs: [u32; 2],
         of_set_up: bool,
+        #[serde(default)]
+        evenly: bool,
         chance: f64,
     },
     /// What the named effects leave of the held-out runs.
@@ -40,9 +42,14 @@ fn does_not_repeat(
     channel: &str,
     size_um: f64,
     [last, first]: [u32; 2],
-    of_set_up: bool,
+    (of_set_up, evenly): (bool, bool),
     chance: f64,
 ) -> fmt::Result {
+    let how = if evenly {
+        format!("it went on changing evenly, by {size_um:.1} µm from run {last} to run {first}")
+    } else {
+        format!("it changed by {size_um:.1} µm between run {last} and run {first}")
+    };
     let what = if of_set_up {
         "only the place of the set-up changed, or a reference point: look at clamps, holders and returns to the reference"
     } else {
@@ -50,8 +57,7 @@ fn does_not_repeat(
     };
     write!(
         f,
-        "{channel} does not repeat: it changed by {size_um:.1} µm between run {last} and run {first} (chance in noise \
-         {chance:.0e}); {what}"
+        "{channel} does not repeat: {how} (chance in noise {chance:.0e}); {what}"
     )
 }
 
@@ -87,8 +93,9 @@ impl fmt::Display for Course {
                 size_um,
                 runs,
                 of_set_up,
+                evenly,
                 chance,
-            } => does_not_repeat(f, channel, *size_um, *runs, *of_set_up, *chance),
+            } => does_not_repeat(f, channel, *size_um, *runs, (*of_set_up, *evenly), *chance),
             Self::Remainder {
                 effects,
                 size_um,

@@ -155,6 +155,28 @@ fn what_changes_without_a_name_does_not_repeat() {
 }
 
 #[test]
+fn what_goes_on_evenly_without_a_name_does_not_repeat_either() {
+    // The same product, that grows from cycle to cycle: no step explains it better than a line.
+    let odd = |um: f64| {
+        move |s: &State| {
+            let [x, y] = s.position;
+            let shape = s.velocity[1].signum() * (x / 50.0).powi(2) * (y / 50.0);
+            [1e-3 * um * shape, 0.0]
+        }
+    };
+    let grown = [0.0, 1.5, 3.0, 4.5, 6.0, 7.5].map(odd);
+    let all: Vec<&Wrong> = grown.iter().map(|one| one as &Wrong).collect();
+    let diagnosis = diagnosed(&cycles(30, &all));
+    let said = told(&diagnosis);
+    let changes = &diagnosis.report.does_not_repeat;
+    let own = changes.iter().find(|one| one.channel == "grid.u");
+    let own = own.expect("a change");
+    assert!(own.evenly && !own.of_set_up, "{own:?} {said}");
+    assert_eq!((own.last_run, own.from_run), (0, 47), "{own:?}");
+    assert!(diagnosis.report.unknown.flagged, "{said}");
+}
+
+#[test]
 fn a_name_that_explains_only_a_part_counts_for_less() {
     let play = soft_play(0, 6e-3);
     let both = move |s: &State| {

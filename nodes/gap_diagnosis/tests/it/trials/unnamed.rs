@@ -55,6 +55,37 @@ fn noise_beyond_the_repeats_is_said_and_nothing_is_named() {
 }
 
 #[test]
+fn a_gap_much_larger_than_noise_is_unknown_also_where_the_noise_is_not_that_of_the_repeats() {
+    // A waviness of the grid's own, in the direction of motion, of no class of the catalogue.
+    let wrong = |s: &State| {
+        let sense = (s.velocity[1] / 50.0).signum();
+        [12e-3 * sense * (s.position[0] / 50.0).powi(2), 0.0]
+    };
+    for seed in 20..24 {
+        let noise = Noise {
+            other_runs: 3.0,
+            ..Noise::default()
+        };
+        let report = diagnosed(&session(seed, noise, &wrong)).report;
+        assert!(
+            report.gap.rms_um > 4.0 * report.gap.floor_um,
+            "{:?}",
+            report.gap
+        );
+        assert!(report.unknown.flagged, "{seed}: {:?}", report.unknown);
+    }
+    // Noise alone, and worse than that of the repeats, is none.
+    for seed in 20..24 {
+        let noise = Noise {
+            other_runs: 1.6,
+            ..Noise::default()
+        };
+        let report = diagnosed(&session(seed, noise, &|_| [0.0; 2])).report;
+        assert!(!report.unknown.flagged, "{seed}: {:?}", report.unknown);
+    }
+}
+
+#[test]
 fn a_session_without_repeats_has_the_noise_within_its_runs_and_names_nothing_of_it() {
     for seed in 30..36 {
         let mut session = session(seed, Noise::default(), &|_| [0.0; 2]);

@@ -82,13 +82,14 @@ fn cause(report: &GapReport) -> String {
         ));
     }
     parts.extend(report.does_not_repeat.iter().map(|change| {
-        format!(
-            "{} does not repeat: it changed by {} µm between run {} and run {}",
-            change.channel,
-            three(change.size_um),
-            change.last_run,
-            change.from_run
-        )
+        let (channel, size) = (&change.channel, three(change.size_um));
+        let [last, from] = [change.last_run, change.from_run];
+        if change.evenly {
+            return format!(
+                "{channel} does not repeat: it went on changing, by {size} µm from run {last} to run {from}"
+            );
+        }
+        format!("{channel} does not repeat: it changed by {size} µm between run {last} and run {from}")
     }));
     if report.unknown.flagged {
         parts.push(unknown(report));

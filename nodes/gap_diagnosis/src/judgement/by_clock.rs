@@ -1,0 +1,75 @@
+//! Whether an effect that goes with the clock alone could as well be heat.
+//!
+//! A tip that wanders evenly in time and one that goes with a body that warms look alike for hours. Where thermometers were
+//! read, the shift with the temperature of each, with and without lags, is put in the place of the slow drift, all other
+//! members refitted beside it:
+//!
+//! ```text
+//!   gain(drift) - max gain(shift) > 2 ln 20,   |shift| <= 50 um/K          (1)
+//! ```
+//!
+//! Where (1) does not hold the drift is shown with that reason: it is not named, and what warms is not known either.
+
+use nalgebra::DVector;
+use twin::effects::{self, Target};
+
+use crate::judgement::by_thermometer::SHIFT;
+use crate::judgement::cause::{Best, Scope};
+use crate::judgement::{Check, CheckId};
+use crate::search::nuisance::orthonormal;
+use crate::search::signature::Library;
+
+/// The effect that has no other cause than time.
+const BY_CLOCK: &str = "ambient_drift";
+/// Lags of a body behind the thermometer, min.
+const LAGS_MIN: [f64; 5] = [0.05, 8.0, 25.0, 80.0, 240.0];
+/// The largest shift of a tip that a machine has, µm/K.
+const MOST_UM_PER_K: f64 = 50.0;
+/// Odds from which the drift is preferred.
+const ODDS: f64 = 20.0;
+
+/// (1) of the member at `place`; `others` are the derivatives of the other members. None where nothing is asked.
+pub(crate) fn check(
+    scope: &Scope<'_, '_>,
+    signatures: &Library,
+    best: &Best,
+    place: usize,
+    others: &[DVector<f64>],
+) -> Option<Check> {
+    let stack = scope.stack;
+    let instance = &signatures.instances[signatures.forms[best.set[place]].instance];
+    let Target::Axis(axis) = instance.target else {
+        return None;
+    };
+    let read = &stack.session.history.temperature_degc;
+    let kind = effects::kind(SHIFT).filter(|_| instance.kind.id == BY_CLOCK)?;
+    if read.is_empty() {
+        return None;
+    }
+    let part = &best.refit.parts[place];
+    let basis = orthonormal(part.len(), others.iter().cloned());
+    let beside = |column: &DVector<f64>| column - &basis * basis.tr_mul(column);
+    let rest = beside(&(&best.left + part));
+    let own = rest.norm_squared() - beside(&best.left).norm_squared();
+    let shifts = read.keys().flat_map(|id| {
+        LAGS_MIN.map(|lag_min| {
+            let mut values = vec![0.0; kind.parameters.len()];
+            values[axis.index()] = 1.0;
+            if let Some(lag) = values.last_mut() {
+                *lag = lag_min;
+            }
+            (kind.build)(Target::Thermometer(id.clone()), &values)
+        })
+    });
+    let gains = shifts.filter_map(|effect| gain(&rest, &beside(&stack.signature(&*effect))));
+    let best_gain = gains.fold(0.0, f64::max);
+    let (lost, limit) = (own - best_gain, 2.0 * ODDS.ln());
+    Some(Check::new(CheckId::BeatsHeat, lost > limit).with(lost, limit))
+}
+
+/// What a shift of so much for 1 µm/K explains, where its size is one that a machine has.
+fn gain(rest: &DVector<f64>, column: &DVector<f64>) -> Option<f64> {
+    let square = column.norm_squared();
+    let size = rest.dot(column) / square;
+    (size.abs() <= MOST_UM_PER_K).then(|| size * size * square)
+}
