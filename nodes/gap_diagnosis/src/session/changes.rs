@@ -164,7 +164,7 @@ pub fn begins(session: &Session, changes: &[Change]) -> Vec<Begins> {
 
 /// Coefficients of all patterns of repeated blocks.
 fn series(session: &Session, rows: &Rows, raw: &[f64]) -> Vec<Series> {
-    let mut all = BTreeMap::<(Channel, usize), Series>::new();
+    let mut all = BTreeMap::<(Channel, usize, [u32; 2]), Series>::new();
     let groups = repeats::groups(session, rows);
     let repeated = groups.iter().enumerate().filter(|(_, own)| own.len() > 1);
     for (group, own) in repeated {
@@ -185,11 +185,15 @@ fn series(session: &Session, rows: &Rows, raw: &[f64]) -> Vec<Series> {
             };
             for (pattern, kind) in wanted.iter().map(|k| kinds[*k]).enumerate() {
                 let radial = block.channel == Channel::Radial && kind == Mode::Place(1);
-                let key = (block.channel.clone(), pattern);
+                let is_shared = kind == Mode::Offset || radial;
+                // A place under another zero, or set up anew, is another place.
+                let set_up = [run.segment.zero_id, run.segment.setup_id];
+                let set_up = if is_shared { set_up } else { [0; 2] };
+                let key = (block.channel.clone(), pattern, set_up);
                 let own = all.entry(key).or_insert_with(|| Series {
                     channel: block.channel.clone(),
                     points: vec![],
-                    is_shared: kind == Mode::Offset || radial,
+                    is_shared,
                 });
                 own.points.push(Point {
                     group,

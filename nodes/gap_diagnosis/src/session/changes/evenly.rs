@@ -23,7 +23,7 @@ use crate::config::GapConfig;
 use crate::search::rows::{Rows, count};
 
 /// Fewest runs of a pattern that show a slope.
-const FEWEST_RUNS: usize = 6;
+const LEAST_RUNS_OF_SLOPE: usize = 6;
 
 /// The largest even change of each channel that `rest`, in mm, shows; between its first and its last run.
 pub fn find(session: &Session, rows: &Rows, rest: &[f64], config: &GapConfig) -> Vec<Change> {
@@ -54,7 +54,7 @@ fn sloped(own: &Series, tried: usize, config: &GapConfig) -> Option<Change> {
     let (before, free) = own.left(vec![]);
     let (after, left) = own.left(slopes.clone());
     let used = free.saturating_sub(left);
-    if runs.len() < FEWEST_RUNS || used == 0 || left < 3 {
+    if runs.len() < LEAST_RUNS_OF_SLOPE || used == 0 || left < 3 {
         return None;
     }
     let scatter = (after / count(left)).max(before * 1e-15);

@@ -111,6 +111,31 @@ fn a_plate_that_slips_twice_is_no_shift_of_the_reference_point() {
 }
 
 #[test]
+fn a_plate_that_is_mounted_anew_has_not_slipped() {
+    let mut session = Session::default();
+    for (cycle, at_mm) in (1..).zip([0.0, 0.085, -0.02, 0.04]) {
+        let play = soft_play(1, 4e-3);
+        let mounted = move |s: &State| {
+            let [u, v] = play(s);
+            [u + at_mm, v]
+        };
+        let seed = 700 + u64::from(cycle);
+        go_on(
+            &mut session,
+            &CYCLE,
+            cycle,
+            seed,
+            Noise::default(),
+            &mounted,
+        );
+    }
+    let diagnosis = diagnosed(&session);
+    assert_eq!(names(&diagnosis), ["backlash Y"], "{}", told(&diagnosis));
+    let slips = &diagnosis.report.does_not_repeat;
+    assert!(slips.is_empty(), "{slips:?}");
+}
+
+#[test]
 fn what_holds_is_said_to_and_of_nothing_nothing_is_named() {
     let play = soft_play(0, 4e-3);
     for seed in 10..14 {

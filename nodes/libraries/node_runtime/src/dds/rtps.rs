@@ -27,7 +27,7 @@ pub(super) type Prefix = [u8; PREFIX_LEN];
 const RTPS_HEADER_LEN: usize = 20;
 const VERSION: [u8; 2] = [2, 4];
 const ACKNACK: u8 = 0x06;
-const HEARTBEAT: u8 = 0x07;
+const HEARTBEAT_SUBMESSAGE: u8 = 0x07;
 const INFO_TS: u8 = 0x09;
 const INFO_SRC: u8 = 0x0c;
 const INFO_DST: u8 = 0x0e;
@@ -120,7 +120,7 @@ pub(super) fn nothing_written(writer: &Guid, reader: &Guid) -> Vec<u8> {
     let begun = begin(&mut datagram, INFO_DST, LITTLE_ENDIAN);
     datagram.extend(whose);
     end(&mut datagram, begun);
-    let begun = begin(&mut datagram, HEARTBEAT, LITTLE_ENDIAN);
+    let begun = begin(&mut datagram, HEARTBEAT_SUBMESSAGE, LITTLE_ENDIAN);
     datagram.extend(reader);
     datagram.extend(writer);
     for number in [1, 0] {
