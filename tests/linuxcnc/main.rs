@@ -26,6 +26,7 @@ use recorder::{Bag, Event, Order};
 use serde_json::Value;
 
 mod killed;
+mod simulated;
 mod strangers;
 
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
