@@ -330,9 +330,8 @@ impl Writer<'_> {
             let travel_mm = bin.travel_mm[axis];
             if travel_mm < REST_MM { 0.0 } else { travel_mm }
         });
-        let length_mm = travel_mm.xyz().norm();
-        if length_mm > 0.0 {
-            self.travel(&travel_mm, length_mm);
+        if travel_mm.xyz().norm() > 0.0 {
+            self.travel(&travel_mm);
         } else {
             let line = format!("G4 P{}", self.order.bin_s);
             self.line(&line);
@@ -340,12 +339,13 @@ impl Writer<'_> {
     }
 
     /// To and fro, so that no axis leaves its window.
-    fn travel(&mut self, travel_mm: &PerAxis<f64>, length_mm: f64) {
+    fn travel(&mut self, travel_mm: &PerAxis<f64>) {
         let order = self.order;
         let n = order.pieces(travel_mm);
-        let feed_mm_min = (length_mm / order.bin_s * 60.0 * 10.0).round() / 10.0;
+        let piece_s = order.bin_s / n;
         for _ in 0..n as usize {
             let mut line = "G1".to_owned();
+            let from_mm = self.at_mm;
             for axis in Axis::LINEAR {
                 let step_mm = travel_mm[axis] / n;
                 if step_mm == 0.0 {
@@ -361,10 +361,29 @@ impl Writer<'_> {
                 self.at_mm[axis] = round(next_mm);
                 line.push_str(&format!(" {axis}{}", self.at_mm[axis]));
             }
-            line.push_str(&format!(" F{feed_mm_min}"));
+            // Of the way as it is written: a piece lasts its time however short it is.
+            let way_mm = (self.at_mm.xyz() - from_mm.xyz()).norm();
+            if way_mm > 0.0 {
+                line.push_str(&format!(" F{}", feed_word(way_mm / piece_s * 60.0)));
+            } else {
+                line = format!("G4 P{piece_s}");
+            }
             self.line(&line);
         }
     }
+}
+
+/// Greatest part by which a feed, and so the time of its line, is off.
+const FEED_ERROR: f64 = 1e-4;
+
+/// A feed in mm/min with the digits that it needs, at least one decimal.
+fn feed_word(feed_mm_min: f64) -> f64 {
+    let rounded = (1..=9).map(|decimals| {
+        let scale = 10_f64.powi(decimals);
+        (feed_mm_min * scale).round() / scale
+    });
+    let mut near = rounded.filter(|word| (word / feed_mm_min - 1.0).abs() <= FEED_ERROR);
+    near.next().unwrap_or(feed_mm_min)
 }
 
 /// To a micrometre, as programs are written.

@@ -138,6 +138,52 @@ fn eq3_a_program_goes_the_travel_within_its_window_and_lasts_the_time() {
     assert_eq!(programs, [first, second]);
 }
 
+/// How long the lines of a program last that are no rapid motion, s.
+fn lasts_s(program: &str) -> f64 {
+    let mut at_mm = [0.0_f64; 3];
+    let mut total_s = 0.0;
+    for line in program.lines() {
+        let words: Vec<&str> = line.split(' ').collect();
+        let word = |letter: char| {
+            let mut found = words.iter().filter_map(|word| word.strip_prefix(letter));
+            found.next().and_then(|value| value.parse::<f64>().ok())
+        };
+        let before_mm = at_mm;
+        for (idx, letter) in ['X', 'Y', 'Z'].into_iter().enumerate() {
+            at_mm[idx] = word(letter).unwrap_or(at_mm[idx]);
+        }
+        let way_mm = (0..3).map(|idx| (at_mm[idx] - before_mm[idx]).powi(2));
+        match words[0] {
+            "G1" => total_s += way_mm.sum::<f64>().sqrt() / word('F').unwrap() * 60.0,
+            "G4" => total_s += word('P').unwrap(),
+            _ => {}
+        }
+    }
+    total_s
+}
+
+#[test]
+fn lines_of_little_travel_last_their_time() {
+    for travel_mm in [0.0, 0.01, 0.012, 0.0199, 0.1, 3.0, 700.0] {
+        let bin = Bin {
+            spindle_rad_s: 100.0,
+            travel_mm: PerAxis::from_fn(|axis| match axis {
+                Axis::X => travel_mm,
+                Axis::Y => travel_mm / 7.0,
+                _ => 0.0,
+            }),
+        };
+        let order = order();
+        let programs = programs(&[bin; 6], "a shift", &order).unwrap();
+        let lasted_s: f64 = programs.iter().map(|program| lasts_s(program)).sum();
+        let wanted_s = 6.0 * order.bin_s;
+        assert!(
+            (lasted_s / wanted_s - 1.0).abs() < 2e-4,
+            "{travel_mm} mm: {lasted_s} s"
+        );
+    }
+}
+
 #[test]
 fn what_the_other_machine_cannot_is_refused() {
     let mut slow = order();
