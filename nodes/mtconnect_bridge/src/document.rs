@@ -241,7 +241,9 @@ fn data_items(root: &Node<'_, '_>) -> Vec<DataItem> {
         .filter(|node| is(node, "CoordinateSystem"));
     let of_machine = systems.filter(|node| {
         let kind = node.attribute("type").unwrap_or_default();
-        ["MACHINE", "BASE"].contains(&kind)
+        ["MACHINE", "BASE"]
+            .iter()
+            .any(|it| it.eq_ignore_ascii_case(kind.trim()))
     });
     let of_machine: BTreeSet<&str> = of_machine.filter_map(|node| node.attribute("id")).collect();
     let items = root.descendants().filter(|node| is(node, "DataItem"));
@@ -253,12 +255,16 @@ fn data_items(root: &Node<'_, '_>) -> Vec<DataItem> {
         .collect()
 }
 
-/// `MACHINE`, `WORK`, or none; a system that is named by its id is that of the machine, or moves against it as `WORK` does.
+/// `MACHINE`, `WORK`, or none; a system with another name or id is that of the machine, or moves against it as `WORK` does.
 fn coordinates(node: &Node<'_, '_>, of_machine: &BTreeSet<&str>) -> String {
     match node.attribute("coordinateSystemIdRef") {
         Some(id) if of_machine.contains(id) => "MACHINE".to_owned(),
         Some(id) if !id.is_empty() => "WORK".to_owned(),
-        _ => attribute(node, "coordinateSystem"),
+        _ => match node.attribute("coordinateSystem").map(str::trim) {
+            None | Some("") => String::new(),
+            Some(word) if word.eq_ignore_ascii_case("MACHINE") => "MACHINE".to_owned(),
+            Some(_) => "WORK".to_owned(),
+        },
     }
 }
 

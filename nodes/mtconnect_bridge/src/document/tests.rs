@@ -51,6 +51,11 @@ fn a_coordinate_system_that_is_named_by_its_id_is_looked_up() {
     for (reference, wanted) in [
         ("", ""),
         ("coordinateSystem=\"WORK\"", "WORK"),
+        ("coordinateSystem=\"work\"", "WORK"),
+        ("coordinateSystem=\" Work \"", "WORK"),
+        ("coordinateSystem=\"part\"", "WORK"),
+        ("coordinateSystem=\"machine\"", "MACHINE"),
+        ("coordinateSystem=\"\"", ""),
         ("coordinateSystemIdRef=\"m\"", "MACHINE"),
         ("coordinateSystemIdRef=\"o\"", "WORK"),
         ("coordinateSystemIdRef=\"nobody\"", "WORK"),
