@@ -83,6 +83,16 @@ pub enum SequencerError {
     NoPoints { step: usize },
     #[error("steps[{step}].id = \"{id}\": the machine file has no artefact of this name")]
     UnknownArtefact { step: usize, id: String },
+    #[error(
+        "steps[{step}].program = \"{program}\", line {line}: (zero: {what}) sets the count to zero by which steps[{measured_by}] measures: remove it; that step sets its zero itself"
+    )]
+    ZeroInProgram {
+        step: usize,
+        program: String,
+        line: usize,
+        what: &'static str,
+        measured_by: usize,
+    },
     #[error("steps: the plan has none")]
     NoSteps,
 }

@@ -27,6 +27,7 @@ pub mod rotary;
 pub mod stage;
 mod task;
 pub mod touch_along;
+mod zeroed;
 
 pub use config::Config;
 pub use error::SequencerError;

@@ -15,6 +15,7 @@ use crate::measuring;
 use crate::plan::{Plan, Step};
 use crate::rotary;
 use crate::touch_along;
+use crate::zeroed;
 
 /// Checks that every step of a plan can be run on this machine.
 pub(crate) fn check(
@@ -26,6 +27,7 @@ pub(crate) fn check(
         return Err(SequencerError::NoSteps);
     }
     bounds::of_plan(plan)?;
+    zeroed::check(plan, programs)?;
     for (at, step) in plan.steps.iter().enumerate() {
         match step {
             Step::Compensation { .. } => {}
