@@ -76,7 +76,8 @@
 //!
 //! # Holds when
 //! Radii are those at 20 °C ([`CircularTest::corrected_to_20_degc`]): (8) and (9) have what is left then.
-//! Each recording goes round the full circle. The circles are those of least squares; the
+//! Each recording goes round the full circle. The circles are those of least squares, of unevenly spaced readings by the arc of
+//! each; the
 //! smallest ring that holds a path can be thinner than G, never thicker.
 //!
 //! # Agreement
@@ -88,6 +89,7 @@
 //! \[1\] ISO 230-4:2022 and, for H, ISO 230-4:1996; from the literature, the texts were not at hand.
 //! \[2\] MTS Ballbar Inspection, "Analyzing your results" (www.mts-nw.com/analyzing.html), minimum and maximum radial deviation.
 
+mod arc;
 mod reference_temperature;
 mod trace;
 
@@ -317,8 +319,7 @@ impl CircularBudget {
 }
 
 fn fitted(points_mm: &[Vector2<f64>]) -> Result<CircleFit, Iso230Error> {
-    // One weight for all: the circle does not depend on its size.
-    Ok(fit_round(points_mm, &vec![1.0; points_mm.len()])?)
+    Ok(fit_round(points_mm, &arc::uncertainties(points_mm))?)
 }
 
 /// In what every figure is expressed.
@@ -380,7 +381,11 @@ fn common_circle(
     let points_mm = all.concat();
     let weights: Vec<f64> = all
         .iter()
-        .flat_map(|path| vec![(path.len() as f64).sqrt(); path.len()])
+        .flat_map(|path| {
+            let of_path = (path.len() as f64).sqrt();
+            let own = arc::uncertainties(path).into_iter();
+            own.map(move |own| of_path * own)
+        })
         .collect();
     Ok(fit_round(&points_mm, &weights)?)
 }
