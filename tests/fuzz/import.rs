@@ -10,6 +10,8 @@
 
 #[path = "../../nodes/abbe/src/import/again.rs"]
 pub mod again;
+#[path = "../../nodes/abbe/src/import/axis_names.rs"]
+pub mod axis_names;
 #[path = "../../nodes/abbe/src/import/beside.rs"]
 pub mod beside;
 #[path = "../../nodes/abbe/src/import/clock_parts.rs"]
@@ -18,6 +20,10 @@ pub mod clock_parts;
 pub mod dates;
 #[path = "../../nodes/abbe/src/import/deviation_names.rs"]
 pub mod deviation_names;
+#[path = "../../nodes/abbe/src/import/directions.rs"]
+pub mod directions;
+#[path = "../../nodes/abbe/src/import/doubled.rs"]
+pub mod doubled;
 #[path = "../../nodes/abbe/src/import/lacking.rs"]
 pub mod lacking;
 #[path = "../../nodes/abbe/src/import/laser_conditions.rs"]
@@ -34,6 +40,8 @@ pub mod map;
 pub mod map_schema;
 #[path = "../../nodes/abbe/src/import/measured.rs"]
 pub mod measured;
+#[path = "../../nodes/abbe/src/import/merged.rs"]
+pub mod merged;
 #[path = "../../nodes/abbe/src/import/motion.rs"]
 pub mod motion;
 #[path = "../../nodes/abbe/src/import/odd.rs"]
@@ -56,12 +64,20 @@ pub mod renishaw_laser;
 pub mod returns;
 #[path = "../../nodes/abbe/src/import/runs.rs"]
 pub mod runs;
+#[path = "../../nodes/abbe/src/import/said_of_numbers.rs"]
+pub mod said_of_numbers;
 #[path = "../../nodes/abbe/src/import/same.rs"]
 pub mod same;
 #[path = "../../nodes/abbe/src/import/separators.rs"]
 pub mod separators;
+#[path = "../../nodes/abbe/src/import/shapes.rs"]
+pub mod shapes;
 #[path = "../../nodes/abbe/src/import/sheet.rs"]
 pub mod sheet;
+#[path = "../../nodes/abbe/src/import/spaced.rs"]
+pub mod spaced;
+#[path = "../../nodes/abbe/src/import/split_decimals.rs"]
+pub mod split_decimals;
 #[path = "../../nodes/abbe/src/import/stated.rs"]
 pub mod stated;
 #[path = "../../nodes/abbe/src/import/statement.rs"]

@@ -20,12 +20,16 @@ use reports::whole_file::WholeFolder;
 
 mod again;
 mod angles;
+mod axis_names;
 mod beside;
 mod book;
 mod clock_parts;
 mod dates;
 mod deviation_names;
+mod directions;
+mod doubled;
 mod file;
+mod formats;
 mod hidden;
 mod instrument;
 mod lacking;
@@ -36,6 +40,7 @@ mod listed;
 pub(crate) mod map;
 mod map_schema;
 mod measured;
+mod merged;
 mod motion;
 mod odd;
 mod parted;
@@ -48,13 +53,18 @@ mod recognise;
 mod renishaw_laser;
 mod returns;
 mod runs;
+mod said_of_numbers;
 mod same;
 mod separators;
+mod shapes;
 mod sheet;
+mod spaced;
+mod split_decimals;
 mod stated;
 mod statement;
 mod table;
 mod times;
+mod titles;
 mod units;
 mod unread;
 mod vocabulary;
@@ -133,7 +143,8 @@ pub(crate) struct Imported {
     n_rows: usize,
     /// Cells that cost a row or a reading.
     pub n_odd: usize,
-    /// Runs of a measurement that the table lacks or that were broken off, and are not in the bag.
+    /// Runs of a measurement that the table lacks or that were broken off, and are not in the bag; targets that an evaluation leaves
+    /// out.
     pub n_lost_runs: usize,
     /// What a reader should know: rows and columns that were left out, and what the runs were made of.
     pub notes: Vec<String>,
@@ -238,7 +249,14 @@ pub(crate) fn import(
     notes.extend(cells.note);
     notes.extend(cells.remarks);
     notes.extend(table.left_out);
+    let one_sided = match &map.test {
+        map::Test::Positioning { axis, .. } => lacking::one_sided(&runs.runs, map::units(*axis)),
+        _ => vec![],
+    };
     let n_odd = table.odd.len();
+    let n_lost = cells.n_lost_runs + one_sided.len() + cells.sheet.overruns.len();
+    notes.extend(spaced::lost(&cells.sheet.overruns));
+    notes.extend(one_sided);
     let n_rows = runs.runs.iter().map(Vec::len).sum();
     notes.extend(runs.remarks);
     Ok(Imported {
@@ -246,7 +264,7 @@ pub(crate) fn import(
         n_messages: written.messages,
         n_rows,
         n_odd,
-        n_lost_runs: cells.n_lost_runs,
+        n_lost_runs: n_lost,
         notes,
     })
 }

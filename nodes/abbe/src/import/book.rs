@@ -10,6 +10,7 @@ use std::io::{Cursor, Read};
 use anyhow::{Context, Result, bail};
 use zip::ZipArchive;
 
+use super::formats::Formats;
 use super::hidden::Hidden;
 
 /// Most parts of a workbook.
@@ -34,15 +35,24 @@ const MOST_OF_LIST: [(&[u8], u64); 6] = [
 /// Bytes that are unpacked at a time.
 const PIECE_BYTES: usize = 64 << 10;
 
-/// Checks a workbook; a line for each part with hidden rows or columns.
+/// What a workbook holds beside its cells.
+#[derive(Debug, Default)]
+pub struct Checked {
+    /// A line for each part with hidden rows or columns.
+    pub hidden: Vec<String>,
+    /// Number formats of cells.
+    pub formats: Formats,
+}
+
+/// Checks a workbook.
 ///
 /// # Errors
 /// With the part and the limit, or with the reference.
-pub fn check(bytes: &[u8]) -> Result<Vec<String>> {
+pub fn check(bytes: &[u8]) -> Result<Checked> {
     check_within(bytes, MOST_UNPACKED_BYTES)
 }
 
-fn check_within(bytes: &[u8], most_bytes: u64) -> Result<Vec<String>> {
+fn check_within(bytes: &[u8], most_bytes: u64) -> Result<Checked> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).context("xlsx")?;
     if archive.len() > MOST_PARTS {
         bail!(
@@ -51,7 +61,7 @@ fn check_within(bytes: &[u8], most_bytes: u64) -> Result<Vec<String>> {
         );
     }
     let mut unpacked = 0_u64;
-    let mut hidden = vec![];
+    let mut checked = Checked::default();
     for place in 0..archive.len() {
         let mut part = archive.by_index(place).context("xlsx")?;
         let name = part.name().context("xlsx")?.into_owned();
@@ -65,6 +75,7 @@ fn check_within(bytes: &[u8], most_bytes: u64) -> Result<Vec<String>> {
         }
         let mut tags = Tags {
             is_xml: name.ends_with(".xml"),
+            formats: std::mem::take(&mut checked.formats),
             ..Tags::default()
         };
         let mut piece = vec![0; PIECE_BYTES];
@@ -82,9 +93,10 @@ fn check_within(bytes: &[u8], most_bytes: u64) -> Result<Vec<String>> {
             tags.take(&piece[..n])
                 .with_context(|| format!("part {name}"))?;
         }
-        hidden.extend(tags.hidden.in_words(&name));
+        checked.hidden.extend(tags.hidden.in_words(&name));
+        checked.formats = tags.formats;
     }
-    Ok(hidden)
+    Ok(checked)
 }
 
 /// Where in an XML text a scan is.
@@ -108,6 +120,7 @@ struct Tags {
     /// Tags of each kind of [`MOST_OF_LIST`] so far.
     entries: [u64; MOST_OF_LIST.len()],
     hidden: Hidden,
+    formats: Formats,
 }
 
 impl Tags {
@@ -139,6 +152,7 @@ impl Tags {
                 self.state = State::Text;
                 self.count()?;
                 self.hidden.take(&self.tag);
+                self.formats.take(&self.tag);
                 return checked(&self.tag);
             }
             (None, b'"' | b'\'') => self.state = State::Tag(Some(byte)),

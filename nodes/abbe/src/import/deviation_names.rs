@@ -217,15 +217,8 @@ const SCALING_MARKS: &[char] = &['*', '×', '·', '²', '^', '=', '%'];
 
 /// The word, or the sign, by which a column may hold something else than readings; none where each is known.
 pub fn doubt(name: &str) -> Option<String> {
-    let first = name.trim_start().chars().next();
-    if let Some(minus) = first.filter(|first| ['-', '\u{2212}', '\u{2013}', '±'].contains(first)) {
-        return Some(minus.to_string());
-    }
-    if words(name).first().is_some_and(|first| first == "minus") {
-        return Some("minus".to_owned());
-    }
-    if let Some(mark) = name.chars().find(|letter| SCALING_MARKS.contains(letter)) {
-        return Some(mark.to_string());
+    if let Some(sign) = sign_of(name) {
+        return Some(sign);
     }
     let digit_beside = |slash: usize| {
         let is_digit = |letter: Option<char>| letter.is_some_and(|letter| letter.is_ascii_digit());
@@ -330,9 +323,79 @@ fn is_times(word: &str) -> bool {
     number.is_some_and(|number| number >= 10)
 }
 
+/// Begins of words of quantities that no displacement and no radial deviation is, and of what was done to its numbers.
+const NO_READING_BEGINS: &[&str] = &[
+    "veloc",
+    "speed",
+    "accel",
+    "setpoint",
+    "command",
+    "residual",
+    "model",
+    "predict",
+    "simul",
+    "cumul",
+    "rough",
+    "vibrat",
+    "thick",
+    "clearance",
+    "invert",
+    "negat",
+    "squared",
+    "geschwind",
+    "rauheit",
+    "schwing",
+    "dicke",
+];
+/// Other such words, whole.
+const NO_READING_WORDS: &[&str] = &[
+    "neg", "minus", "abs", "absolute", "sum", "cum", "dt", "times",
+];
+
+/// The word, or the sign, by which a column of a log or of circles holds no plain readings; none where none is seen.
+fn doubt_of_reading(name: &str) -> Option<String> {
+    if let Some(sign) = sign_of(name) {
+        return Some(sign);
+    }
+    let every = words(name);
+    // `mm/s` is a unit, `z/2` a half and `dz/dt` a speed.
+    let after_slash = name.split('/').skip(1).map(str::trim_start);
+    let is_digit = |text: &str| text.starts_with(|letter: char| letter.is_ascii_digit());
+    if after_slash.into_iter().any(is_digit) && stated::of(name).unknown().is_none() {
+        return Some("/".to_owned());
+    }
+    let is_other = |word: &&String| {
+        NO_READING_WORDS.contains(&word.as_str())
+            || NO_READING_BEGINS
+                .iter()
+                .any(|begin| word.starts_with(begin))
+            || is_times(word)
+    };
+    odd_number(&every).or_else(|| every.iter().find(is_other).cloned())
+}
+
+/// A sign before a name, or one of a multiplication in it.
+fn sign_of(name: &str) -> Option<String> {
+    let first = name.trim_start().chars().next();
+    if let Some(minus) = first.filter(|first| ['-', '\u{2212}', '\u{2013}', '±'].contains(first)) {
+        return Some(minus.to_string());
+    }
+    if words(name).first().is_some_and(|first| first == "minus") {
+        return Some("minus".to_owned());
+    }
+    let mark = name.chars().find(|letter| SCALING_MARKS.contains(letter));
+    mark.map(|mark| mark.to_string())
+}
+
 /// The columns of a table, where beside targets or angles only those hold deviations whose names say nothing else.
 pub fn plain_alone(mut columns: Vec<Known>) -> Vec<Known> {
     let is_place = |column: &Known| matches!(column.role, Some(Role::Target | Role::Angle));
+    for column in &mut columns {
+        let is_reading = matches!(column.role, Some(Role::Displacement | Role::Radial));
+        if is_reading && doubt_of_reading(&column.name).is_some() {
+            column.role = None;
+        }
+    }
     if columns.iter().any(is_place) {
         let deviations = columns.iter_mut();
         for column in deviations.filter(|column| column.role == Some(Role::Deviation)) {
@@ -347,10 +410,12 @@ pub fn plain_alone(mut columns: Vec<Known>) -> Vec<Known> {
 /// A sentence on columns that are no deviations by a word of their names; empty without any.
 pub fn unsure(found: &Recognised) -> String {
     let columns = found.columns.iter().filter(|column| column.role.is_none());
-    let in_doubt = columns.filter(|column| !column.numbers.is_empty() && is_one(&column.name));
+    let in_doubt = columns.filter(|column| !column.numbers.is_empty());
     let named: Vec<String> = in_doubt
         .filter_map(|column| {
-            let word = doubt(&column.name)?;
+            let of_reading = || doubt_of_reading(&column.name);
+            let of_deviation = doubt(&column.name).filter(|_| is_one(&column.name));
+            let word = of_deviation.or_else(of_reading)?;
             Some(format!("\"{}\" ({word})", column.name))
         })
         .collect();
@@ -358,8 +423,8 @@ pub fn unsure(found: &Recognised) -> String {
         return String::new();
     }
     format!(
-        "column {}: may hold something else than deviations by what stands in brackets here: where it has the measured positions \
-         less the targets, name it as deviation_um in a map; ",
+        "column {}: may hold no plain readings by what stands in brackets here: where it has what was measured less what was meant, \
+         name it in a map (deviation_um, displacement_um, radial_um); ",
         named.join(", ")
     )
 }

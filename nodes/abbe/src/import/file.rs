@@ -76,8 +76,15 @@ fn of_xlsx(bytes: Vec<u8>, form: Form<'_>, is_table: &dyn Fn(&Sheet) -> bool) ->
             bytes.len()
         );
     }
-    let mut hidden = book::check(&bytes)?;
+    let book::Checked {
+        mut hidden,
+        formats,
+    } = book::check(&bytes)?;
+    if let Some(scaled) = formats.scaled() {
+        bail!("{scaled}");
+    }
     let mut cells = of_book(bytes, form, is_table)?;
+    cells.sheet.shown_units = formats.units();
     hidden.extend(cells.note.take());
     cells.note = (!hidden.is_empty()).then(|| hidden.join("; "));
     Ok(cells)

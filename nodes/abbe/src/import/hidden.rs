@@ -83,7 +83,7 @@ fn whole(rest: &[u8], key: &[u8]) -> Option<u32> {
 }
 
 /// The column of a reference, from 1; none where it has no letters.
-fn column(reference: &[u8]) -> Option<u32> {
+pub fn column(reference: &[u8]) -> Option<u32> {
     let letters = reference
         .iter()
         .take_while(|byte| byte.is_ascii_alphabetic());

@@ -15,6 +15,48 @@ const NAMED: usize = 10;
 /// A target from one side, comparable from run to run.
 type Visit = (i64, bool);
 
+/// Names targets that every run reads from one side alone, in a test of both sides: an evaluation leaves them out.
+pub fn one_sided(runs: &[Vec<Row>], units: Units) -> Vec<String> {
+    let broken_off = passes::are_broken_off(runs);
+    let whole = runs.iter().zip(broken_off);
+    let whole = whole.filter_map(|(rows, is_broken_off)| (!is_broken_off).then_some(rows));
+    let mut seen: BTreeMap<i64, (f64, [usize; 2])> = BTreeMap::new();
+    for rows in whole {
+        for (row, way) in rows.iter().zip(ways(rows)) {
+            if row.cells[2].is_nan() {
+                continue;
+            }
+            let place = (row.cells[1] / GRID_MM).round() as i64;
+            let (_, n) = seen.entry(place).or_insert((row.cells[1], [0, 0]));
+            n[usize::from(way > 0.0)] += 1;
+        }
+    }
+    let has = |side: usize| seen.values().filter(|(_, n)| n[side] > 0).count();
+    let has_both = |(_, n): &(f64, [usize; 2])| n.iter().all(|n| *n > 0);
+    if has(0) == 0 || has(1) == 0 || !seen.values().any(has_both) {
+        return vec![];
+    }
+    let odd = seen.values().filter(|target| !has_both(target));
+    let odd = odd.map(|(target, [down, up])| {
+        let lacking = if *up > 0 { "down" } else { "up" };
+        format!(
+            "warning, target {target} {} has no reading {lacking} in any run: an evaluation of both directions leaves it out, {} readings; \
+             read it from both sides, beyond which the axis turns round",
+            units.target,
+            down + up
+        )
+    });
+    let mut remarks: Vec<String> = odd.take(NAMED).collect();
+    let others = seen.values().filter(|target| !has_both(target)).count();
+    let others = others.saturating_sub(NAMED);
+    remarks.extend((others > 0).then(|| {
+        format!(
+            "{others} more targets have readings from one side alone: an evaluation leaves them out"
+        )
+    }));
+    remarks
+}
+
 /// Refuses a target that a run has twice from one side; names those that a run lacks which was not broken off.
 ///
 /// # Errors

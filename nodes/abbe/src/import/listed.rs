@@ -15,6 +15,11 @@ const LEAST_OF_A_DIRECTION: f64 = 0.5;
 /// Nothing is done where an order of rows agrees with its directions, where one direction is missing, or where rows are in no
 /// order at all: then one of them is likely to be wrong, and it is refused later on with its line.
 pub fn relist(runs: &mut Vec<Vec<Row>>) -> Option<String> {
+    if let [rows] = runs.as_slice()
+        && let Some(parted) = parted(rows)
+    {
+        *runs = parted;
+    }
     let rows = || runs.iter().flatten();
     if !rows().all(|row| row.cells.get(3).is_some_and(|way| way.abs() > 0.0)) {
         return None;
@@ -36,6 +41,31 @@ pub fn relist(runs: &mut Vec<Vec<Row>>) -> Option<String> {
         "line {line}: the rows are listed by target, and not in the order of the measurement. They were put in order by their directions, \
          upwards first and then downwards"
     ))
+}
+
+/// The runs of rows without a number of one, where each direction is listed by target again and again.
+fn parted(rows: &[Row]) -> Option<Vec<Vec<Row>>> {
+    let has_way = |row: &Row| row.cells.get(3).is_some();
+    if !rows.iter().all(has_way) || order(rows).is_some() {
+        return None;
+    }
+    let blocks: Vec<&[Row]> = rows.chunk_by(|a, b| is_up(a) == is_up(b)).collect();
+    let orders: Vec<f64> = { blocks.iter() }
+        .map(|rows| monotone(rows))
+        .collect::<Option<_>>()?;
+    let is_one = orders.windows(2).all(|two| two[0] * two[1] > 0.0);
+    if blocks.len() < 4 || !is_one {
+        return None;
+    }
+    let number = |(k, rows): (usize, &[&[Row]])| {
+        let rows = rows.iter().copied().flatten().cloned();
+        rows.map(|mut row| {
+            row.cells[0] = k as f64 + 1.0;
+            row
+        })
+        .collect()
+    };
+    Some(blocks.chunks(2).enumerate().map(number).collect())
 }
 
 fn is_up(row: &Row) -> bool {

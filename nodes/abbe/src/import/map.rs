@@ -121,6 +121,9 @@ pub enum Test {
         run: Option<String>,
         /// Column of the time, s.
         time_s: String,
+        /// Time between two samples, ms, where that column numbers the samples.
+        #[serde(default)]
+        period_ms: Option<f64>,
         /// Column of the displacement, µm; of two heights that of the first.
         displacement_um: String,
         /// Column of the displacement at the second of two heights, µm, for the tilt of ISO 230-3.
@@ -442,7 +445,7 @@ impl Map {
             ..
         } = &self.test
         else {
-            return Ok(());
+            return self.check_period();
         };
         let ways = [
             deviation_um.is_some(),
@@ -454,9 +457,16 @@ impl Map {
                 "test.positioning: must have one of deviation_um, measured_mm (the position that was measured) and passes_um (a column for each pass)"
             );
         }
-        if !passes_um.is_empty() && (run.is_some() || direction.is_some()) {
+        // A row may be one of a run with a column for each direction.
+        let is_of_rows = match passes_um.as_slice() {
+            [up, down] => up.direction != down.direction,
+            _ => false,
+        };
+        let has_run = run.is_some() && !is_of_rows;
+        if !passes_um.is_empty() && (has_run || direction.is_some()) {
             bail!(
-                "test.positioning: passes_um names runs and directions: remove the keys run and direction"
+                "test.positioning: passes_um names runs and directions: remove the keys run and direction (run may stand beside one pass up \
+                 and one down)"
             );
         }
         Ok(())
@@ -539,6 +549,10 @@ mod tests {
             ("deviation_um: d, measured_mm: m", "must have one of"),
             (
                 "direction: w, passes_um: [{column: a, direction: up}]",
+                "remove the keys run and direction",
+            ),
+            (
+                "run: n, passes_um: [{column: a, direction: up}]",
                 "remove the keys run and direction",
             ),
             ("deviation_um: t", "two keys name the column \"t\""),

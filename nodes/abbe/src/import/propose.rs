@@ -7,11 +7,12 @@ use anyhow::{Context, Result, bail};
 use metrology::Axis;
 use metrology::yaml::shown;
 
-use super::map::{Direction, Map, Plane, Test, units};
+use super::map::{Direction, Map, Test, units};
 use super::pass_names;
 use super::recognise::{Known, Recognised, Role};
 use super::separators;
 use super::stated::{in_one_line, quoted};
+use super::titles;
 use super::units::{Kind, Unit};
 pub use likely::{doubt, doubt_of_targets};
 use likely::{likely_deviation, likely_target};
@@ -40,9 +41,10 @@ pub fn of(path: &Path) -> Result<Proposal> {
         bail!("{odd}");
     }
     let stem = path.file_stem().map(|stem| stem.to_string_lossy());
-    let axis = found.axis(&stem.unwrap_or_default());
+    let stem = stem.unwrap_or_default();
     let mut text = Text::new(&found, path);
-    text.start_s = looked.start_s.unwrap_or(0.0);
+    let start_s = looked.start_s.or_else(|| titles::start_s(&found));
+    text.start_s = start_s.unwrap_or(0.0);
     if let Some(form) = looked.form {
         text.recognised = vec![format!(
             "{}: {form}, {} readings",
@@ -55,9 +57,9 @@ pub fn of(path: &Path) -> Result<Proposal> {
         text.recognised.push(format!("sheet: \"{name}\""));
     }
     match kind(&found) {
-        Some(Of::Positioning) => text.positioning(axis)?,
-        Some(Of::Log) => text.log(axis)?,
-        Some(Of::Circle) => text.circle()?,
+        Some(Of::Positioning) => text.positioning(found.axis(&stem, false)?)?,
+        Some(Of::Log) => text.log(found.axis(&stem, true)?)?,
+        Some(Of::Circle) => text.circle(&stem)?,
         None => bail!("{}", nothing::in_words(&found)),
     };
     Ok(Proposal {
@@ -78,7 +80,10 @@ enum Of {
 
 fn kind(found: &Recognised) -> Option<Of> {
     let has = |role: Role| found.first(role).is_some();
-    let is_read = has(Role::Deviation) || has(Role::Measured) || !found.passes().is_empty();
+    let is_read = has(Role::Deviation)
+        || has(Role::Measured)
+        || !found.passes().is_empty()
+        || dial::column(found).is_some();
     if has(Role::Target) && is_read {
         Some(Of::Positioning)
     } else if has(Role::Time) && (has(Role::Displacement) || has(Role::Deviation)) {
@@ -114,10 +119,13 @@ impl<'t> Text<'t> {
             '\t' => "tabs".to_owned(),
             other => format!("\"{other}\""),
         };
+        let names = match found.head_line {
+            0 => "no line of names, so its columns are \"column 1\" and so on".to_owned(),
+            line => format!("names of columns in line {line}"),
+        };
         let said = format!(
-            "{}: names of columns in line {}, {} rows below; cells apart by {form}, decimals behind \"{}\"",
+            "{}: {names}, {} rows below; cells apart by {form}, decimals behind \"{}\"",
             path.display(),
-            found.head_line,
             found.n_rows,
             found.decimal
         );
@@ -181,7 +189,7 @@ impl<'t> Text<'t> {
     fn unit(&mut self, column: &Known, wanted: Unit, likely: Option<Unit>) -> Result<()> {
         if let Some([with, without]) = &column.thousands {
             bail!(
-                "column \"{}\": \"{}\" and \"{}\": every separator has three digits behind it and some numbers have none, as where it marks \
+                "column \"{}\": \"{}\" and \"{}\": every separator has three digits behind it and other numbers have none, as where it marks \
                  thousands: write the numbers without it; or all with decimals, where it stands before decimals",
                 shown(&column.name),
                 shown(with),
@@ -234,8 +242,9 @@ impl<'t> Text<'t> {
 
     fn positioning(&mut self, told: Option<Axis>) -> Result<()> {
         let found = self.found;
+        titles::check(found)?;
         let target = found.first(Role::Target).context("no column of targets")?;
-        let stated = found.axis_stated();
+        let stated = found.axis_stated()?;
         let is_rotary = stated.is_some_and(|axis| !axis.is_linear());
         let is_angle = target
             .unit
@@ -303,6 +312,11 @@ impl<'t> Text<'t> {
             self.passes(&passes, key("passes_um", "passes_arcsec"), deviation)?;
             return Ok(true);
         }
+        if let Some(read) = dial::column(found) {
+            self.dial(key("deviation_um", "deviation_arcsec"), read);
+            self.unit(read, deviation, likely_deviation(&[read], deviation))?;
+            return Ok(false);
+        }
         match (found.first(Role::Deviation), found.first(Role::Measured)) {
             (Some(read), _) => {
                 sign::check(found, read)?;
@@ -325,6 +339,9 @@ impl<'t> Text<'t> {
     fn passes(&mut self, passes: &[(&Known, Direction)], key: &str, wanted: Unit) -> Result<()> {
         pass_names::check(self.found)?;
         pass_names::check_sides(self.found)?;
+        if let Some(run) = passes_of::run(self.found, passes) {
+            self.column("run", run);
+        }
         let _ = writeln!(self.test, "    {key}:");
         let columns: Vec<&Known> = passes.iter().map(|(column, _)| *column).collect();
         across::check_positions(self.found, &columns)?;
@@ -337,7 +354,10 @@ impl<'t> Text<'t> {
             let name = quoted(&column.name);
             let _ = writeln!(self.test, "      - {{column: {name}, direction: {word}}}");
             self.note(&format!("pass {word}"), column);
-            self.unit(column, wanted, likely)?;
+            match passes_of::unit(passes, column) {
+                Some(unit) => self.unit_of_others(column, (unit, wanted)),
+                None => self.unit(column, wanted, likely)?,
+            }
         }
         Ok(())
     }
@@ -360,7 +380,7 @@ impl<'t> Text<'t> {
         let read = found.first(Role::Displacement);
         let read = read.or_else(|| found.first(Role::Deviation));
         let read = read.context("no column of displacements")?;
-        if let Some(axis) = found.axis_stated().filter(|axis| !axis.is_linear()) {
+        if let Some(axis) = found.axis_stated()?.filter(|axis| !axis.is_linear()) {
             bail!("the table says axis {axis}: a log is of a length along X, Y or Z: write a map");
         }
         let axis = told.filter(|axis| axis.is_linear());
@@ -404,7 +424,7 @@ impl<'t> Text<'t> {
         Ok(())
     }
 
-    fn circle(&mut self) -> Result<()> {
+    fn circle(&mut self, stem: &str) -> Result<()> {
         let found = self.found;
         let angle = found.first(Role::Angle).context("no column of angles")?;
         let (read, nominal) = radial::columns(found)?;
@@ -412,26 +432,9 @@ impl<'t> Text<'t> {
         let run =
             run.context("no column of the run: a circle needs one that numbers the circles")?;
         self.test.push_str("  circle:\n");
-        match &found.plane_column {
-            Some((name, plane)) => {
-                let _ = writeln!(self.test, "    plane: {plane}");
-                self.recognised.push(format!("plane {plane}"));
-                self.used.push(name.clone());
-            }
-            None => self.stated("plane", &Plane::Xy.to_string(), "plane of the circles"),
-        }
+        self.plane(stem)?;
         self.stated("centre_mm", "[0.0, 0.0, 0.0]", "centre of the circles");
-        match nominal {
-            Some((column, radius_mm)) => {
-                let _ = writeln!(self.test, "    radius_mm: {radius_mm:?}");
-                self.note("radius_mm", column);
-            }
-            None => self.stated(
-                "radius_mm",
-                "100.0",
-                "nominal radius; lengths that follow from it (scale, squareness) depend on it",
-            ),
-        }
+        self.radius(nominal, stem);
         match radial::feed(found) {
             Some((column, feed_mm_min)) => {
                 let _ = writeln!(self.test, "    feed_mm_min: {feed_mm_min:?}");
@@ -556,12 +559,16 @@ pub fn machine_for(map: &Map) -> String {
 mod across;
 #[cfg(test)]
 mod cells;
+mod dial;
 mod epochs;
 mod likely;
 mod looked;
 mod nothing;
+mod passes_of;
 mod radial;
 mod sign;
 #[cfg(test)]
 mod tests;
 mod time_unit;
+#[cfg(test)]
+mod way_words;

@@ -31,7 +31,15 @@ const ROLE_WORDS: [(Role, &[&str], &[&str]); 9] = [
     ),
     (
         Role::Run,
-        &["run", "cycle", "lauf", "zyklus", "pass"],
+        &[
+            "run",
+            "cycle",
+            "lauf",
+            "zyklus",
+            "pass",
+            "durchgang",
+            "durchlauf",
+        ],
         &["nr", "no", "n"],
     ),
     (

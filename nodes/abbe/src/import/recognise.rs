@@ -5,12 +5,14 @@ use metrology::Axis;
 
 use super::beside;
 use super::deviation_names;
+use super::directions;
 use super::map::{Direction, Plane};
 use super::odd::is_missing;
 use super::pass_names;
-use super::prose;
 use super::quantities;
+use super::said_of_numbers;
 use super::sheet::Sheet;
+use super::split_decimals;
 use super::stated::{self, Stated};
 use super::table::number_of;
 use super::times;
@@ -80,10 +82,10 @@ pub struct Recognised {
     pub columns: Vec<Known>,
     /// Rows below the names.
     pub n_rows: usize,
-    /// Words above the names.
-    pub above: String,
-    /// Words of the comments above the names.
-    pub comments: String,
+    /// Lines above the names, with their numbers.
+    pub above: Vec<(u64, String)>,
+    /// Comments above the names.
+    pub comments: Vec<(u64, String)>,
     /// A column of dates, which stand before the times of their rows.
     pub date_column: Option<String>,
     /// A column of axes, with the first of them.
@@ -118,12 +120,12 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
     };
     let rows = lines[at + 1..].iter().filter(|(_, cells)| is_row(cells));
     let rows: Vec<&(u64, Vec<String>)> = rows.take(LOOKED_AT).collect();
-    let below = lines.get(at + 1).map_or(&[][..], |(_, cells)| cells);
-    let units = below
+    let next = lines.get(at + 1).map_or(&[][..], |(_, cells)| cells);
+    let units = next
         .iter()
         .map(String::as_str)
         .filter(|cell| !cell.is_empty());
-    let units = if stated::is_row(units) { below } else { &[] };
+    let units = if stated::is_row(units) { next } else { &[] };
     let columns = head.iter().enumerate().filter(|(_, name)| !name.is_empty());
     let columns = columns.map(|(k, name)| {
         let cells: Vec<(u64, &str)> = rows
@@ -133,24 +135,51 @@ pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
             .collect();
         let unit = units
             .get(k)
+            .or_else(|| sheet.shown_units.get(&k))
             .map_or(Stated::Nothing, |cell| stated::of_cell(cell));
         known(name, unit, &cells, decimal)
     });
     let columns = deviation_names::plain_alone(columns.collect());
-    let above = lines[..at].iter().map(|(_, cells)| cells.join(" "));
+    let above = lines[..at]
+        .iter()
+        .map(|(line, cells)| (*line, cells.join(" ")));
+    let below = &lines[at + 1..];
+    let odd = beside::odd(head, below)
+        .or_else(|| odd_direction(&columns, head, (below, decimal)))
+        .or_else(|| split_decimals::odd(&columns, head, below))
+        .or_else(|| said_of_numbers::odd(&columns, head, below));
     Some(Recognised {
         separator: sheet.separator.unwrap_or(','),
         decimal,
         head_line: *head_line,
         columns,
         n_rows: lines.len() - at - 1,
-        above: above.collect::<Vec<_>>().join(" "),
-        comments: String::new(),
+        above: above.collect(),
+        comments: vec![],
         date_column: sheet.dates.and_then(|place| head.get(place).cloned()),
-        axis_column: beside::axis(head, &lines[at + 1..]),
-        plane_column: beside::plane(head, &lines[at + 1..]),
-        odd: beside::odd(head, &lines[at + 1..]),
+        axis_column: beside::axis(head, below),
+        plane_column: beside::plane(head, below),
+        odd,
     })
+}
+
+/// What is wrong with a column of directions beside targets that is not understood.
+fn odd_direction(
+    columns: &[Known],
+    head: &[String],
+    (lines, decimal): (&[(u64, Vec<String>)], char),
+) -> Option<String> {
+    let is_one = |column: &Known, role: Role| column.role == Some(role);
+    let target = columns.iter().find(|column| is_one(column, Role::Target))?;
+    let has_direction = |column: &Known| {
+        is_one(column, Role::Direction) || matches!(column.role, Some(Role::Pass(_)))
+    };
+    let at = head.iter().position(|name| *name == target.name)?;
+    let odd = || directions::odd(head, lines, at, decimal);
+    match columns.iter().any(has_direction) {
+        true => None,
+        false => odd(),
+    }
 }
 
 /// Whether a cell looks like a time of the day, with or without its date.
@@ -195,6 +224,15 @@ pub fn of_text(text: &str) -> Result<Option<Recognised>> {
         // Of ways that give the same cells the plain one: a point as decimal.
         (numbers, found.decimal == '.')
     });
+    // Blanks are between words too, so they part cells where nothing else does.
+    let of_blanks = || {
+        let sheet = Sheet::of_text(begin, ' ').ok()?;
+        let forms = ['.', ','].into_iter();
+        forms
+            .filter_map(|decimal| of(&sheet, decimal))
+            .find(unread::is_even)
+    };
+    let best = best.or_else(of_blanks);
     let best = match best {
         Some(best) if begin.len() < text.len() => {
             of(&Sheet::of_text(text, best.separator)?, best.decimal)
@@ -203,11 +241,11 @@ pub fn of_text(text: &str) -> Result<Option<Recognised>> {
     };
     Ok(best.map(|best| {
         let above = usize::try_from(best.head_line).unwrap_or(usize::MAX);
-        let lines = text
-            .lines()
-            .take(above)
-            .filter(|line| line.starts_with('#'));
-        let comments = lines.collect::<Vec<_>>().join(" ");
+        let lines = (1..).zip(text.lines()).take(above);
+        let comments = lines.filter(|(_, line)| line.starts_with('#'));
+        let comments =
+            comments.map(|(n, line)| (n, line.trim_matches(['#', ' ', '\t']).to_owned()));
+        let comments = comments.collect();
         Recognised { comments, ..best }
     }))
 }
@@ -245,6 +283,16 @@ fn known(name: &str, below: Stated, lines: &[(u64, &str)], decimal: char) -> Kno
         role(name, &words, unit, (cells, is_numeric))
     };
     let (first_line, first) = first(lines, decimal);
+    let small = || {
+        let is_small = match role {
+            Some(Role::Target) => matches!(unit, Some(Unit::Um | Unit::Nm)),
+            Some(Role::Deviation | Role::Pass(_) | Role::Displacement | Role::Radial) => {
+                unit == Some(Unit::Nm)
+            }
+            _ => false,
+        };
+        is_small.then(|| unread::thousands_of_small(cells, decimal))?
+    };
     let is_bare = unit.is_none() && unknown.is_none();
     let is_place = || is_bare && is_numeric && is_warm(&words, &numbers);
     let role = role.or_else(|| is_place().then_some(Role::Temperature));
@@ -254,7 +302,7 @@ fn known(name: &str, below: Stated, lines: &[(u64, &str)], decimal: char) -> Kno
         unit,
         unknown,
         numbers,
-        thousands: unread::thousands(cells, decimal),
+        thousands: unread::thousands(cells, decimal).or_else(small),
         first: first.to_owned(),
         first_line,
         odd: odd(lines, decimal),
@@ -327,7 +375,12 @@ fn quantity_words(name: &str) -> Vec<String> {
 
 /// Whether a column is that of the directions; one odd cell makes no other of it.
 fn is_direction(cells: &[&str], is_named: bool, is_numeric: bool) -> bool {
-    let ways = cells.iter().filter_map(|cell| Direction::of_word(cell));
+    // A letter or a word of another language is a direction under a name that says so.
+    let way = |cell: &&str| match is_named {
+        true => directions::of_cell(cell),
+        false => Direction::of_word(cell),
+    };
+    let ways = cells.iter().filter_map(way);
     let ways: Vec<Direction> = ways.collect();
     let has_both = ways.contains(&Direction::Up) && ways.contains(&Direction::Down);
     let are_all = ways.len() == cells.len();
@@ -341,13 +394,7 @@ fn role(
     unit: Option<Unit>,
     (cells, is_numeric): (&[&str], bool),
 ) -> Option<Role> {
-    let has = |starts: &[&str]| {
-        words
-            .iter()
-            .any(|word| starts.iter().any(|start| word.starts_with(start)))
-    };
-    let names_way = has(&["dir", "way", "richt", "approach", "sense"]);
-    if is_direction(cells, names_way, is_numeric) {
+    if is_direction(cells, directions::is_name(name), is_numeric) {
         return Some(Role::Direction);
     }
     let kind = unit.map(Unit::kind);
@@ -408,34 +455,6 @@ impl Recognised {
         columns
             .filter_map(|column| Some((column, pass(column)?)))
             .collect()
-    }
-
-    /// The axis that a column or the lines above the table state.
-    pub fn axis_stated(&self) -> Option<Axis> {
-        let column = self.axis_column.as_ref().map(|(_, axis)| *axis);
-        column
-            .or_else(|| prose::axis(&self.above, false))
-            .or_else(|| prose::axis(&self.comments, true))
-    }
-
-    /// The axis that is named by the file, the lines above the table, or a column.
-    pub fn axis(&self, stem: &str) -> Option<Axis> {
-        // Of a name of a file a capital alone: `c.csv` is no axis.
-        let of_name = || {
-            let mut words = stem.split(|letter: char| !letter.is_alphanumeric());
-            words.find_map(prose::letter)
-        };
-        let of_column = || {
-            let read = [Role::Displacement, Role::Deviation, Role::Target];
-            let read = read.into_iter().filter_map(|role| self.first(role));
-            let passes = self.passes().into_iter().map(|(column, _)| column);
-            let mut columns = passes.chain(read);
-            columns.find_map(|column| {
-                let pass = pass_names::of(&column.name).and_then(|pass| pass.axis);
-                pass.or_else(|| pass_names::axis_of(words(&column.name).first()?))
-            })
-        };
-        self.axis_stated().or_else(of_name).or_else(of_column)
     }
 }
 
@@ -520,7 +539,7 @@ mod tests {
             (found.separator, found.decimal, found.head_line),
             (',', '.', 3)
         );
-        assert_eq!(found.axis("table"), Some(Axis::Y));
+        assert_eq!(found.axis("table", false).expect("an axis"), Some(Axis::Y));
         let found = of_text("# made\n# units: mm\n\nn,t,d\n1,0,1.5\n")
             .unwrap()
             .expect("a table");
@@ -538,8 +557,9 @@ mod tests {
             .unwrap()
             .expect("a table");
         assert_eq!(
-            (found.axis("log"), found.axis("lead_X")),
-            (Some(Axis::Z), Some(Axis::X))
+            ["log", "lead_X"].map(|stem| found.axis(stem, true).expect("an axis")),
+            [Some(Axis::Z); 2],
+            "a column says more than the name of a file"
         );
     }
 

@@ -14,6 +14,7 @@ use anyhow::{Result, bail};
 use metrology::Axis;
 use metrology::number::number;
 
+use super::doubled;
 use super::lacking;
 use super::limits::Range;
 use super::listed;
@@ -27,6 +28,8 @@ pub const SAME_TARGET_MM: f64 = 1e-9;
 /// Spacing of the grid on which targets are compared from run to run, mm.
 pub const GRID_MM: f64 = 1e-6;
 
+/// Targets of a turning point that lie closer may be meant to be one, mm or deg.
+const MOST_JITTER: f64 = 1.0;
 /// Most runs of a table: a test has some ten, and every one is evaluated.
 pub const MOST_RUNS: usize = 10_000;
 /// The runs of a table.
@@ -86,6 +89,7 @@ fn ordered(test: &Test, table: &Table) -> Result<Runs> {
         remarks.extend(unwrap(&mut runs, turn));
     }
     remarks.extend(same::merge(&mut runs, *same_target_um, units));
+    doubled::check(&runs, units)?;
     let is_counted = run.is_none() && test.passes().is_empty();
     if is_counted || passes::are_rows(&runs) {
         let counted = passes::repetitions(runs.concat())?;
@@ -321,6 +325,10 @@ fn check_directions(runs: &[Vec<Row>], units: Units) -> Result<()> {
         for (k, way) in ways(rows).into_iter().enumerate().skip(1) {
             let (row, before) = (&rows[k], &rows[k - 1]);
             if row.cells.get(3).is_some_and(|told| *told * way < 0.0) {
+                let apart = row.cells[1] - before.cells[1];
+                if apart.abs() < MOST_JITTER && row.cells.get(3) != before.cells.get(3) {
+                    bail!("{}", jitter(row, before, units));
+                }
                 bail!(
                     "line {}: run {}: target {} {unit} after {} {unit} is approached {}, and its direction says {}: rows must be in the order of the measurement",
                     row.line,
@@ -335,6 +343,20 @@ fn check_directions(runs: &[Vec<Row>], units: Units) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Two targets at a turning point that are meant to be one.
+fn jitter(row: &Row, before: &Row, units: Units) -> String {
+    format!(
+        "line {}: run {}: target {} {unit} after {} {unit}, where the direction turns: where they are meant to be one target, state \
+         same_target_{} in the map, how far such targets differ",
+        row.line,
+        row.cells[0],
+        row.cells[1],
+        before.cells[1],
+        units.of_cells[1].name(),
+        unit = units.target
+    )
 }
 
 #[cfg(test)]

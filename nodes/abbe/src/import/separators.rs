@@ -59,7 +59,7 @@ pub(super) fn no_names(path: &Path) -> String {
     let text = text_file::read(path, Comments::Csv).ok();
     let remedy = match text.as_deref().and_then(foreign) {
         Some(by) => format!(
-            "its columns seem to be apart by {by}, and comma, semicolon and tab are read: put one of those between them"
+            "its columns seem to be apart by {by}, and no line has a name for each of them: put commas, semicolons or tabs between the cells"
         ),
         None => "write a map (docs/reference/scenario.md#import-map)".to_owned(),
     };

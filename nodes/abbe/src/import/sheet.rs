@@ -1,8 +1,11 @@
 //! The cells of a table as words, whatever kind of file they stood in.
 
+use std::collections::BTreeMap;
+
 use anyhow::{Context, Result, bail};
 
 use super::dates;
+use super::spaced;
 
 /// Most columns of a table that are read.
 pub const MOST_COLUMNS: u32 = 1_000;
@@ -21,6 +24,10 @@ pub struct Sheet {
     pub dates: Option<usize>,
     /// Comments of a text with their lines, without the sign that begins them.
     pub comments: Vec<(u64, String)>,
+    /// Words for units that the number formats of columns show, by the places of the columns.
+    pub shown_units: BTreeMap<usize, String>,
+    /// Lines at which a sampler lost samples.
+    pub overruns: Vec<u64>,
 }
 
 /// The cells of a file, and which of its worksheets they are.
@@ -52,6 +59,18 @@ impl Sheet {
         let whole = text.trim_end_matches(['\u{1a}', '\0', '\r', '\n']);
         // A comment on a last line without an end would be a row.
         let text = &format!("{whole}\n");
+        if separator == ' ' {
+            let mut spaced = spaced::cut(text)?;
+            let dates = dates::join(&mut spaced.lines);
+            return Ok(Self {
+                lines: spaced.lines,
+                separator: Some(separator),
+                dates,
+                comments: comments(text),
+                overruns: spaced.overruns,
+                ..Self::default()
+            });
+        }
         let byte = u8::try_from(separator).context("separator: must be one byte")?;
         let mut reader = csv::ReaderBuilder::new()
             .delimiter(byte)
@@ -90,6 +109,7 @@ impl Sheet {
             separator: Some(separator),
             dates,
             comments: comments(text),
+            ..Self::default()
         })
     }
 

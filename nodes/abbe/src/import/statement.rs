@@ -1,6 +1,11 @@
 //! What a map states of the measurement, as the bag of its table carries it.
 
+use anyhow::{Result, bail};
+
 use super::map::{Map, Test, units};
+
+/// Longest time between two samples, ms: an hour.
+const LONGEST_PERIOD_MS: f64 = 3_600_000.0;
 
 impl Map {
     /// What the map states of the measurement, as a bag carries it (`params/import.yaml`); `assumed`: keys whose values nobody
@@ -27,6 +32,29 @@ impl Map {
         };
         let begin = format!("start_s: {}\n", self.start_s);
         begin + &numbers.collect::<String>() + &keys
+    }
+
+    /// The period of numbered samples is one, and their numbers have no unit.
+    pub(super) fn check_period(&self) -> Result<()> {
+        let Test::Log {
+            time_s,
+            period_ms: Some(period_ms),
+            ..
+        } = &self.test
+        else {
+            return Ok(());
+        };
+        if !(*period_ms > 0.0 && *period_ms <= LONGEST_PERIOD_MS) {
+            bail!(
+                "test.log.period_ms = {period_ms}: must be more than 0 and at most {LONGEST_PERIOD_MS} ms"
+            );
+        }
+        if self.units.contains_key(time_s) {
+            bail!(
+                "test.log.period_ms: the column \"{time_s}\" numbers samples, and units states its unit: remove one of them"
+            );
+        }
+        Ok(())
     }
 
     /// The instrument's resolution with its key, where the map states it.

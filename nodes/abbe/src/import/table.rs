@@ -7,12 +7,15 @@ use metrology::yaml::shown;
 use super::again;
 use super::beside;
 use super::clock_parts;
+use super::directions;
 use super::limits::Range;
-use super::map::{Column, Direction, Map, Test, What, units};
+use super::map::{Column, Map, Test, What, units};
 use super::measured;
+use super::merged;
 use super::odd::{Cost, Odd, Read, is_missing};
 use super::prose;
 use super::separators;
+use super::shapes;
 use super::sheet::Sheet;
 use super::stated;
 use super::times;
@@ -70,7 +73,9 @@ impl Table {
         left_out.extend(prose::check(map, sheet, at, has_units)?);
         let mut rows = vec![];
         let (mut n_empty, mut n_rows) = (0_u64, 0);
-        for (k, (line, cells)) in sheet.lines.iter().enumerate().skip(at + 1) {
+        let (lines, merged) = merged::filled(&sheet.lines, at, (&columns, &places));
+        left_out.extend(merged);
+        for (k, (line, cells)) in lines.iter().enumerate().skip(at + 1) {
             if cells.iter().all(String::is_empty) {
                 n_empty += 1;
                 continue;
@@ -94,7 +99,7 @@ impl Table {
         }
         beside::check(map, head, &sheet.lines[at + 1..], &rows)?;
         left_out.extend(measured::check(map, head, &sheet.lines[at + 1..], &rows)?);
-        let rows = shaped(rows, map);
+        let rows = shapes::shaped(rows, map);
         Ok(Self {
             rows,
             left_out,
@@ -193,10 +198,18 @@ impl Reader<'_> {
             found.extend(clock_parts::over_midnight(name, place, rows)?);
         }
         let times_s: Vec<f64> = rows.iter().map(|row| row.cells[place]).collect();
+        let has_period = matches!(
+            &self.map.test,
+            Test::Log {
+                period_ms: Some(_),
+                ..
+            }
+        );
+        let is_stated = has_period || self.map.units.contains_key(name);
         found.extend(match (self.is_whole_clock, self.is_clock) {
             (true, _) => None,
             (_, true) => clock_parts::of_two_parts(name, &times_s)?,
-            _ => times::of_column(name, &times_s, self.map.units.contains_key(name))?,
+            _ => times::of_column(name, &times_s, is_stated)?,
         });
         Ok(found)
     }
@@ -225,39 +238,6 @@ impl Reader<'_> {
             self.n_missing
         )))
     }
-}
-
-/// Rows as every kind of table of a test has them: of a positioning test run, target, deviation and, where it is known,
-/// direction.
-fn shaped(rows: Vec<Row>, map: &Map) -> Vec<Row> {
-    let passes = map.test.passes();
-    if passes.is_empty() {
-        return match &map.test {
-            Test::Positioning { run: None, .. } => rows.into_iter().map(numbered).collect(),
-            _ => rows,
-        };
-    }
-    let mut shaped = vec![];
-    for (k, pass) in passes.iter().enumerate() {
-        let sign = pass.direction.sign();
-        let mut own: Vec<Row> = rows
-            .iter()
-            .map(|row| Row {
-                line: row.line,
-                cells: vec![(k + 1) as f64, row.cells[0], row.cells[k + 1], sign],
-            })
-            .collect();
-        own.sort_by(|a, b| (sign * a.cells[1]).total_cmp(&(sign * b.cells[1])));
-        shaped.extend(own);
-    }
-    shaped
-}
-
-/// A row without a number of run as one of the first.
-fn numbered(row: Row) -> Row {
-    let Row { line, mut cells } = row;
-    cells.insert(0, 1.0);
-    Row { line, cells }
 }
 
 /// A number as a person or a program writes it: with a typographic minus, and spaces that mark thousands.
@@ -293,11 +273,12 @@ fn read_cell(
         return Ok(Read::Odd(why.to_owned()));
     }
     if column.what == What::Direction {
-        return Ok(match Direction::of_word(cell) {
+        return Ok(match directions::of_cell(cell) {
             Some(direction) => Read::Number(direction.sign()),
             None => Read::Odd(format!(
-                "\"{}\": must be one of up, +, 1, forward, ↑, down, -, -1, reverse, ↓",
-                shown(cell)
+                "\"{}\": must be one of {}",
+                shown(cell),
+                directions::KNOWN_WORDS
             )),
         });
     }
@@ -346,6 +327,16 @@ fn read_cell(
 /// A number in the unit that its column is wanted in; a measured position as its deviation from the target `before` it.
 fn converted(read: f64, column: Column<'_>, map: &Map, before: Option<f64>) -> f64 {
     let stated = map.units.get(column.name);
+    if let (
+        What::Time,
+        Test::Log {
+            period_ms: Some(period_ms),
+            ..
+        },
+    ) = (column.what, &map.test)
+    {
+        return read * period_ms / 1e3;
+    }
     let number = match (stated, column.what.unit()) {
         (Some(stated), Some(wanted)) if *stated != wanted => stated.convert(read, wanted),
         _ => read,
@@ -464,7 +455,10 @@ test:
         );
         assert_eq!(
             said,
-            "line 2, column \"way\": \"north\": must be one of up, +, 1, forward, ↑, down, -, -1, reverse, ↓"
+            format!(
+                "line 2, column \"way\": \"north\": must be one of {}",
+                directions::KNOWN_WORDS
+            )
         );
     }
 

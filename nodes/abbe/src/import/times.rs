@@ -23,6 +23,7 @@ const LEAST_SPACING_S: f64 = 0.005;
 /// two weeks.
 const USUAL_SPACING_S: [f64; 2] = [0.5, 600.0];
 const USUAL_LENGTH_S: [f64; 2] = [900.0, 14.0 * 86_400.0];
+const DAY_S: f64 = 86_400.0;
 /// A number beyond it counts from 1970 and shows its unit by itself.
 const EPOCH_S: f64 = 6e8;
 /// The units in which rows are looked for: how many make a second, and what they are called.
@@ -56,7 +57,17 @@ pub fn of_text(cell: &str) -> Result<Option<f64>> {
         _ if cell.contains(':') => (None, cell),
         _ => (Some(cell), "00:00:00"),
     };
-    let clock = in_24_hours(clock).with_context(words)?;
+    // ISO 8601 ends a day with 24:00:00, the begin of the next one.
+    let rest = clock.strip_prefix("24:00").filter(|_| date.is_some());
+    let is_end_of_day =
+        rest.is_some_and(|rest| rest.chars().all(|letter| ":0.,Z".contains(letter)));
+    let begin = if is_end_of_day {
+        clock.replacen("24", "00", 1)
+    } else {
+        clock.to_owned()
+    };
+    let added_s = if is_end_of_day { DAY_S } else { 0.0 };
+    let clock = in_24_hours(&begin).with_context(words)?;
     let Some(date) = date else {
         let day = read_stamp(&format!("1970-01-01T{clock}")).with_context(words)?;
         return Ok(Some(seconds(day.nanos())));
@@ -67,7 +78,7 @@ pub fn of_text(cell: &str) -> Result<Option<f64>> {
         true => format!("\"{}\": {OF_NO_CLOCK}", shown(cell)),
         false => words(),
     })?;
-    Ok(Some(seconds(stamp.nanos())))
+    Ok(Some(seconds(stamp.nanos()) + added_s))
 }
 
 /// Limits of the instants that a message can carry, and the remedy.
@@ -382,6 +393,8 @@ mod tests {
             ("1/25/2026 08:15:30 PM", 1_769_372_130.0),
             ("25/1/2026 20:15:30", 1_769_372_130.0),
             ("2026-01-05", 1_767_571_200.0),
+            ("2026-01-04 24:00:00", 1_767_571_200.0),
+            ("2026-01-04T24:00:00.000", 1_767_571_200.0),
         ] {
             assert_eq!(of_text(cell).unwrap(), Some(wanted), "{cell}");
         }

@@ -2,7 +2,7 @@
 
 use metrology::yaml::shown;
 
-use super::recognise::{Recognised, Role, role_of_name};
+use super::recognise::{Known, Recognised, Role, role_of_name};
 use super::sheet::Sheet;
 use super::stated;
 
@@ -12,6 +12,14 @@ const LEAST_NAMES: usize = 2;
 /// Whether a cell has a digit of any script.
 pub fn has_digit(cell: &str) -> bool {
     cell.contains(char::is_numeric)
+}
+
+/// Whether every column of a text that was cut at its blanks has a number in every row, as a table has.
+pub fn is_even(found: &Recognised) -> bool {
+    let n = |column: &Known| column.numbers.len();
+    let most = found.columns.iter().map(n).max().unwrap_or(0);
+    let is_full = |column: &Known| n(column) == most || column.role.is_some();
+    most > 1 && found.columns.iter().all(is_full)
 }
 
 /// Rows among which a line of units may stand below the names.
@@ -95,6 +103,29 @@ pub fn thousands(cells: &[&str], separator: char) -> Option<[String; 2]> {
     }
     let [with, without] = found;
     Some([with?, without?])
+}
+
+/// A cell by which separators of numbers in a unit of so small a size mark thousands: three digits stand behind each, and none
+/// begins with a zero. Nanometres have no decimals that an instrument reads, and targets in micrometres none of three digits.
+pub fn thousands_of_small(cells: &[&str], separator: char) -> Option<[String; 2]> {
+    let mut first = None;
+    for cell in cells {
+        let signs = ['-', '+', '\u{2212}', '\u{2013}', ' '];
+        let text = cell.trim_start_matches(signs);
+        let is_digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+        match text.split_once(separator) {
+            Some((front, behind)) => {
+                let is_one = is_digits(front) && is_digits(behind) && !front.starts_with('0');
+                if !is_one || behind.len() != 3 {
+                    return None;
+                }
+                first.get_or_insert((*cell).to_owned());
+            }
+            None if is_digits(text) => {}
+            None => return None,
+        }
+    }
+    first.map(|cell| [cell, "0".to_owned()])
 }
 
 /// A sentence for each column that is a quantity by its name and has cells that are no numbers; none without any.

@@ -7,6 +7,7 @@ use metrology::{Host, epoch};
 use super::super::recognise::Known;
 use super::super::times;
 use super::super::units::Unit;
+use super::super::vocabulary::words;
 
 /// From 1990 to 2100, s since 1970 (`date -u -d 1990-01-01 +%s`): measurements are in between.
 const MEASURED_S: [f64; 2] = [631_152_000.0, 4_102_444_800.0];
@@ -18,6 +19,10 @@ const TICKS: [(&str, &str, f64); 2] = [
 const TICKS_A_SECOND: f64 = 1e7;
 /// 1970 in seconds since 1904, which LabVIEW writes.
 const LABVIEW_1970_S: f64 = 2_082_844_800.0;
+/// 1970 in seconds since 1900, which NTP counts.
+const NTP_1970_S: f64 = 2_208_988_800.0;
+/// 1980-01-06 in seconds since 1970, from which GPS counts.
+const GPS_EPOCH_S: f64 = 315_964_800.0;
 /// No measurement is later, s since 1970: 2060.
 const LATEST_S: f64 = 2_840_140_800.0;
 
@@ -75,12 +80,28 @@ pub fn check(time: &Known, first: f64) -> Result<Option<String>> {
     if is_beyond && epoch::likely_unit(first).is_none() {
         check_start(time, first)?;
     }
-    let is_labview = first > LATEST_S && is_measured(first - LABVIEW_1970_S);
-    Ok(is_labview.then(|| {
+    let is_of = |of_1970: f64| first > LATEST_S && is_measured(first - of_1970);
+    if !is_of(LABVIEW_1970_S) && !is_of(NTP_1970_S) {
+        return Ok(None);
+    }
+    Ok(Some(format!(
+        "column \"{name}\": \"{cell}\": looks like seconds since 1904, as LabVIEW writes them, or since 1900, as NTP counts them, and was read as \
+         seconds since 1970: subtract {LABVIEW_1970_S} or {NTP_1970_S} for the date"
+    )))
+}
+
+/// What is doubtful about a column that is named GPS, which counts from 1980.
+pub fn check_gps(time: &Known, first_s: f64) -> Option<String> {
+    let is_gps = words(&time.name).iter().any(|word| word == "gps");
+    let is_of_epoch = is_measured(first_s) || is_measured(first_s + GPS_EPOCH_S);
+    (is_gps && is_of_epoch).then(|| {
         format!(
-            "column \"{name}\": \"{cell}\": looks like seconds since 1904, as LabVIEW writes them, and was read as seconds since 1970: subtract {LABVIEW_1970_S} for the date"
+            "column \"{}\": \"{}\": named GPS, which counts from 1980-01-06, and was read as seconds since 1970: add {GPS_EPOCH_S} less \
+             the leap seconds (18 since 2017) for the date",
+            shown(&time.name),
+            shown(&time.first)
         )
-    }))
+    })
 }
 
 #[cfg(test)]

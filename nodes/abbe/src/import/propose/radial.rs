@@ -1,13 +1,61 @@
 //! Which column of a circle is the radial deviation, and which the nominal radius.
 
+use std::fmt::Write as _;
+
 use anyhow::{Context, Result, bail};
 use metrology::number::number;
 
+use super::super::map::Plane;
 use super::super::recognise::{Known, Recognised, Role};
+use super::super::titles;
 use super::super::units::{Kind, Unit};
+use super::super::vocabulary::words;
+use super::Text;
 
 /// Radial deviations that are all beyond it, mm, are radii.
 const WHOLE_RADIUS_MM: f64 = 1.0;
+
+impl Text<'_> {
+    /// The plane of circles: of a column, a line above the names, or the file's name.
+    pub(super) fn plane(&mut self, stem: &str) -> Result<()> {
+        let found = self.found;
+        let of_column = found.plane_column.as_ref();
+        let plane = match of_column {
+            Some((name, plane)) => {
+                self.used.push(name.clone());
+                Some(*plane)
+            }
+            None => titles::plane(found, stem)?,
+        };
+        match plane {
+            Some(plane) => {
+                let _ = writeln!(self.test, "    plane: {plane}");
+                self.recognised.push(format!("plane {plane}"));
+            }
+            None => self.stated("plane", &Plane::Xy.to_string(), "plane of the circles"),
+        }
+        Ok(())
+    }
+
+    /// The nominal radius: of a column, a line above the names, or the file's name.
+    pub(super) fn radius(&mut self, of_column: Option<(&Known, f64)>, stem: &str) {
+        let of_title = || titles::radius_mm(self.found, stem);
+        let radius_mm = of_column.map(|(_, radius_mm)| radius_mm).or_else(of_title);
+        let Some(radius_mm) = radius_mm else {
+            self.stated(
+                "radius_mm",
+                "100.0",
+                "nominal radius; lengths that follow from it (scale, squareness) depend on it",
+            );
+            return;
+        };
+        let _ = writeln!(self.test, "    radius_mm: {radius_mm:?}");
+        match of_column {
+            Some((column, _)) => self.note("radius_mm", column),
+            None => self.recognised.push(format!("radius {radius_mm} mm")),
+        }
+    }
+}
 
 /// A column of the feed whose number is one, in mm/min: named so, or without a unit.
 pub fn feed(found: &Recognised) -> Option<(&Known, f64)> {
@@ -58,14 +106,24 @@ pub fn columns(found: &Recognised) -> Result<(&Known, Option<(&Known, f64)>)> {
         }
         return Ok((read, None));
     };
-    let nominal = radii().find_map(|column| {
+    // `R mm` is a length without a word for a radius.
+    let is_letter = |column: &&Known| {
+        let own = words(&column.name);
+        own.first().is_some_and(|word| word == "r") && own.len() <= 2
+    };
+    let of_letter = found.columns.iter().filter(is_letter);
+    let of_letter = of_letter.filter(|column| column.name != read.name);
+    let nominal = radii().chain(of_letter).find_map(|column| {
         let first = column.numbers.first().copied()?;
         let is_one = column
             .numbers
             .iter()
             .all(|other| other.total_cmp(&first).is_eq());
-        let unit = column.unit.filter(|unit| unit.kind() == Kind::Length)?;
-        is_one.then(|| (column, unit.convert(first, Unit::Mm)))
+        let unit = column.unit.unwrap_or(Unit::Mm);
+        let is_length = unit.kind() == Kind::Length && column.unknown.is_none();
+        let radius_mm = unit.convert(first, Unit::Mm);
+        let is_radius = is_one && is_length && radius_mm > WHOLE_RADIUS_MM;
+        is_radius.then_some((column, radius_mm))
     });
     Ok((read, nominal))
 }

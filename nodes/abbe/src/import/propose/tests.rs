@@ -1,5 +1,6 @@
 //! Proposals are maps that are taken.
 
+use super::super::map::Plane;
 use super::*;
 use machine::MachineFile;
 use metrology::yaml;

@@ -46,6 +46,7 @@ impl Text<'_> {
             .or_else(|| times::likely(&time.numbers))
             .unwrap_or(Unit::Second);
         let first_s = unit.convert(first, Unit::Second);
+        self.needed.extend(epochs::check_gps(time, first_s));
         match epochs::of_excel(unit, first) {
             Some(begin_s) => {
                 self.start_s = begin_s;
