@@ -10,6 +10,7 @@ mod descriptions;
 mod equal_bytes;
 mod frames;
 mod host_clocks;
+mod joined;
 mod kept;
 mod leaps;
 mod lifecycle;

@@ -263,7 +263,7 @@ fn a_run_that_was_not_completed_is_told_with_its_number_test_and_reason() {
         });
     });
     let found = report(broken.path());
-    assert_eq!(found.code, 0, "{}", found.said);
+    assert_eq!(found.code, 3, "{}", found.said);
     let words = "Not evaluated: run 1, positioning along or about X: its end says that it was not completed";
     assert!(found.said.contains(words), "{}", found.said);
     let told = &found.json["not_completed"][0];

@@ -157,7 +157,7 @@ impl ReportBag {
             table.as_ref().map(|table| table.bag.as_path()),
         );
         let is_table_whole = table.as_ref().is_none_or(|table| table.is_whole());
-        let is_whole = tests.is_whole() && is_evaluated(&report) && is_table_whole;
+        let is_whole = is_whole(&tests, &report) && is_table_whole;
         alarms::ended(alarms.as_ref(), kept, loss::exit_code(is_whole))
     }
 
@@ -271,7 +271,7 @@ fn judged_page(
     let defaults_line = machine_defaults::in_words(&defaults);
     let mut sections = sections(tests, budget)?;
     let lines = lines_of(tests, sections.is_empty());
-    let is_bad = !tests.not_evaluated.is_empty() || !tests.reading.is_whole();
+    let is_bad = !tests.is_whole();
     let all = sections.iter().map(|section| section.figures.clone());
     let mut figures: Vec<serde_json::Value> = all.filter(|figures| !figures.is_null()).collect();
     if budget.is_none() {
@@ -326,6 +326,11 @@ fn judged_page(
     })
 }
 
+/// Whether nothing was lost or left out, and every test that was measured has a figure.
+pub fn is_whole(tests: &Tests, report: &Report) -> bool {
+    tests.is_whole() && is_evaluated(report)
+}
+
 /// Whether every test that was measured has a figure.
 fn is_evaluated(report: &Report) -> bool {
     let without = report.figures["not_evaluated"].as_array();
@@ -336,7 +341,7 @@ fn is_evaluated(report: &Report) -> bool {
 fn lines_of(tests: &Tests, is_empty: bool) -> Vec<String> {
     let mut lines = loss::in_words(&tests.reading);
     lines.extend(tests.broken_off.iter().map(ToString::to_string));
-    let n = tests.not_evaluated.len();
+    let n = tests.not_evaluated.len() + tests.broken_off.len();
     if n > 0 {
         lines.push(format!(
             "NOT WHOLE: runs that were measured and are not evaluated: {n}."

@@ -236,20 +236,10 @@ impl Run {
         simulated_latency::state(&mut outcome.evidence, scenario);
         let title = format!("{}: {}", scenario.name, scenario.file.title);
         let mut report = Report::of(scenario.file.report, &title, &outcome.evidence)?;
-        let mut between = None;
-        if scenario.file.report == ReportKind::Tests && outcome.recorded > 0 {
-            complain!("Evaluating the tests of {}", bag.display());
-            let tests = Tests::of(&Bag::open(&bag)?);
-            between = tests.conditions.nanos();
-            report.join(report_bag::page("", &tests, scenario.budget()?.as_ref())?);
-        } else if scenario.file.report == ReportKind::Rotary && outcome.recorded > 0 {
-            between = add_probing(&mut report, scenario, &Bag::open(&bag)?)?;
-        } else if outcome.recorded > 0 {
-            let seen = TestConditions::of(&Bag::open(&bag)?);
-            between = seen.nanos();
-            let budget = scenario.budget()?;
-            report.add_conditions(&test_conditions::of(&seen, budget.as_ref(), None));
-        }
+        let Measured {
+            between,
+            is_evaluated,
+        } = add_measured(&mut report, scenario, &bag, outcome.recorded)?;
         if outcome.failure.is_none() {
             match self.try_table(scenario, folder, interruption) {
                 Ok(Some(section)) => report.add("linuxcnc_table", &section),
@@ -284,7 +274,7 @@ impl Run {
             bag: Some(bag.as_path()).filter(|_| has_bag),
             page: page.as_deref(),
         });
-        let ended = outcome.end();
+        let ended = outcome.end(is_evaluated);
         let code = unwritten.map_or(ended, |it| it.complain());
         let (alarms, kept) = match alarms {
             Ok(alarms) => (alarms, kept),
@@ -428,8 +418,8 @@ impl Outcome {
         conditions.any(|it| it.diagnostic.name.starts_with("output_refused/"))
     }
 
-    /// Says what did not work; the exit code.
-    fn end(self) -> ExitCode {
+    /// Says what did not work; the exit code, also by whether every run that was measured is evaluated.
+    fn end(self, is_evaluated: bool) -> ExitCode {
         let shortcomings = self.shortcomings();
         if !shortcomings.is_empty() {
             complain!("abbe: what did not go as planned:");
@@ -438,7 +428,10 @@ impl Outcome {
             complain!("abbe:   {line}");
         }
         match self.failure {
-            None => loss::exit_code(self.trouble.is_none() && !self.lacks_outputs()),
+            None => {
+                let is_whole = self.trouble.is_none() && !self.lacks_outputs();
+                loss::exit_code(is_whole && is_evaluated)
+            }
             // Also where the table's own run was.
             Some(reason) if reason.ends_with(INTERRUPTED) => {
                 complain!("abbe: the plan did not run to its end: {reason}");
@@ -452,21 +445,67 @@ impl Outcome {
     }
 }
 
-/// Adds what ISO 230-10 says of the touches, with the conditions; gives begin and end of the tests.
-fn add_probing(report: &mut Report, scenario: &Scenario, bag: &Bag) -> Result<Option<(i64, i64)>> {
-    let tests = Tests::of(bag);
+/// What the bag of a run holds beside what its witness saw.
+struct Measured {
+    /// Begin and end of its tests, ns.
+    between: Option<(i64, i64)>,
+    /// Whether every run that was measured is evaluated.
+    is_evaluated: bool,
+}
+
+/// Adds the tests of a bag, or its touches, and their conditions.
+fn add_measured(
+    report: &mut Report,
+    scenario: &Scenario,
+    bag: &Path,
+    n_recorded: u64,
+) -> Result<Measured> {
+    let mut found = Measured {
+        between: None,
+        is_evaluated: true,
+    };
+    if n_recorded == 0 {
+        return Ok(found);
+    }
+    match scenario.file.report {
+        ReportKind::Tests => {
+            complain!("Evaluating the tests of {}", bag.display());
+            let tests = Tests::of(&Bag::open(bag)?);
+            found.between = tests.conditions.nanos();
+            let page = report_bag::page("", &tests, scenario.budget()?.as_ref())?;
+            found.is_evaluated = report_bag::is_whole(&tests, &page);
+            report.join(page);
+        }
+        ReportKind::Rotary => {
+            let tests = Tests::of(&Bag::open(bag)?);
+            found.between = tests.conditions.nanos();
+            found.is_evaluated = tests.is_whole();
+            add_probing(report, scenario, &tests)?;
+        }
+        _ => {
+            let seen = TestConditions::of(&Bag::open(bag)?);
+            found.between = seen.nanos();
+            let budget = scenario.budget()?;
+            report.add_conditions(&test_conditions::of(&seen, budget.as_ref(), None));
+        }
+    }
+    Ok(found)
+}
+
+/// Adds what ISO 230-10 says of the touches, with the conditions.
+fn add_probing(report: &mut Report, scenario: &Scenario, tests: &Tests) -> Result<()> {
     let budget = scenario.budget()?;
     budget
         .as_ref()
-        .map_or(Ok(()), |budget| budget.check_tests(&tests))?;
-    let sections = probing::sections(&tests, budget.as_ref());
+        .map_or(Ok(()), |budget| budget.check_tests(tests))?;
+    let sections = probing::sections(tests, budget.as_ref());
     report.add_tests(&sections, budget.is_some());
     report.add_conditions(&test_conditions::of(
         &tests.conditions,
         budget.as_ref(),
-        Some(&tests),
+        Some(tests),
     ));
-    Ok(tests.conditions.nanos())
+    Ok(())
 }
 
 /// States machine, time, software, the recording and what did not go as planned.
@@ -517,4 +556,23 @@ fn new_folder(out: &Path, name: &str) -> Result<PathBuf> {
         "{}: 99 runs of this second are there already",
         out.display()
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_measured_what_is_not_evaluated_ends_as_the_report_of_its_bag() {
+        let outcome = || Outcome {
+            evidence: Evidence::default(),
+            failure: None,
+            recorded: 1,
+            lost: 0,
+            trouble: None,
+        };
+        let shown = |code: ExitCode| format!("{code:?}");
+        assert_eq!(shown(outcome().end(true)), shown(ExitCode::SUCCESS));
+        assert_eq!(shown(outcome().end(false)), shown(loss::exit_code(false)));
+    }
 }

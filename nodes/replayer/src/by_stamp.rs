@@ -9,9 +9,11 @@
 //!   o = max(s - l)        of a topic                                        (1)
 //!   k = s - o             axis states and readings: never later than l      (2)
 //!   k = l                 all others, and topics whose s - l differ by more than T  (3)
+//!   k = s - o(axes)       begins and ends of runs, where they are asked for by stamp  (4)
 //! ```
 //!
-//! A message is handed on when none that is still to come can be before it: when one was recorded later than `k + T`.
+//! A message is handed on when none that is still to come can be before it: when one was recorded later than `k + T`, with (4)
+//! later than `k + T` and the greatest lateness of a begin or end.
 //!
 //! # Holds when
 //! One message of a topic came as fast as those of the others: a topic that was late throughout stays so much behind.
@@ -27,6 +29,8 @@ use crate::reading::stamp_of;
 use crate::stamps::{TOLERANCE_NANOS, nanos_of};
 use crate::turned::Held;
 
+/// Begins and ends whose stamps are farther from those of the axis states than this by their log times were late, ns.
+const SEGMENT_LATE_NANOS: i64 = 250_000_000;
 /// Most messages that wait: of one instant there may be a whole bag.
 const MOST_HELD: usize = 1_000_000;
 
@@ -47,6 +51,40 @@ pub(crate) struct ByStamp {
     n_taken: u64,
     /// Of the last begin or end.
     segment_nanos: Option<i64>,
+    /// o of (4); none: begins and ends are read by log time.
+    segments_by_nanos: Option<i64>,
+    /// How much later than k a message may have been recorded, ns.
+    wait_nanos: i64,
+}
+
+/// How the stamps of begins and ends lie to those of the axis states.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SegmentClock {
+    /// o of (4), ns.
+    axes_nanos: i64,
+    /// Least and greatest `s - l - o` of begins and ends, ns.
+    off_nanos: (i64, i64),
+}
+
+impl SegmentClock {
+    /// Of the topics with these numbers; `None`: they agree, or one of them has no clock.
+    pub(crate) fn of(
+        offsets_nanos: &BTreeMap<usize, (i64, i64)>,
+        (axes, segments): (usize, usize),
+    ) -> Option<Self> {
+        let (_, axes_nanos) = *offsets_nanos.get(&axes)?;
+        let (least, greatest) = *offsets_nanos.get(&segments)?;
+        let off_nanos = (
+            least.saturating_sub(axes_nanos),
+            greatest.saturating_sub(axes_nanos),
+        );
+        let is_off = off_nanos.0.saturating_abs() > SEGMENT_LATE_NANOS
+            || off_nanos.1.saturating_abs() > SEGMENT_LATE_NANOS;
+        is_off.then_some(Self {
+            axes_nanos,
+            off_nanos,
+        })
+    }
 }
 
 impl ByStamp {
@@ -62,7 +100,17 @@ impl ByStamp {
             held: BTreeMap::new(),
             n_taken: 0,
             segment_nanos: None,
+            segments_by_nanos: None,
+            wait_nanos: TOLERANCE_NANOS,
         }
+    }
+
+    /// With begins and ends by (4).
+    pub(crate) fn with_segments(mut self, clock: SegmentClock) -> Self {
+        self.segments_by_nanos = Some(clock.axes_nanos);
+        let late_nanos = clock.off_nanos.0.saturating_neg().max(0);
+        self.wait_nanos = TOLERANCE_NANOS.saturating_add(late_nanos);
+        self
     }
 
     /// Takes a message.
@@ -77,7 +125,7 @@ impl ByStamp {
         let log = i64::try_from(log_time_nanos).unwrap_or(i64::MAX);
         let is_full = self.held.len() > MOST_HELD;
         let first = self.held.first_entry()?;
-        let is_due = first.key().0 < log.saturating_sub(TOLERANCE_NANOS);
+        let is_due = first.key().0 < log.saturating_sub(self.wait_nanos);
         (is_due || is_full).then(|| first.remove())
     }
 
@@ -89,6 +137,9 @@ impl ByStamp {
     fn key(&mut self, message: &MessageRef<'_>, entry: &Entry) -> (i64, Rank) {
         let log = i64::try_from(message.log_time_nanos).unwrap_or(i64::MAX);
         if entry.name == topics::TEST_SEGMENT.name {
+            let stamp = || stamp_of(entry.description.type_name, message.data).map(nanos_of);
+            let by_stamp = self.segments_by_nanos.zip(stamp());
+            let log = by_stamp.map_or(log, |(offset, stamp)| stamp.saturating_sub(offset));
             let follows = self.segment_nanos.replace(log) == Some(log);
             let begins = from_cdr::<TestSegment>(message.data).is_ok_and(|segment| segment.begin);
             // A begin at the instant of the end before it is behind that.

@@ -3,12 +3,14 @@
 //! Every verb that reads what messages say reads through here: a topic is compared with ours once ([`crate::known`]), a
 //! message that cannot be used is left out alone and counted, and the rest goes on.
 
-use abbe_msgs::topics::{Entry, Topic, TopicFamily};
+use std::collections::BTreeMap;
+
+use abbe_msgs::topics::{self, Entry, Topic, TopicFamily};
 use abbe_msgs::{FieldParts, Message, Wire, from_cdr, parts_of};
 use recorder::{Bag, Event, Loss, MessageRef, Order};
 
 use crate::account::{Account, Place, Reason, TopicAccount};
-use crate::by_stamp::ByStamp;
+use crate::by_stamp::{ByStamp, SegmentClock};
 use crate::known::{entry_in_any_namespace, unreadable};
 use crate::leap::Leaps;
 use crate::repeats::{self, Repeats};
@@ -25,6 +27,8 @@ pub struct Reading {
     pub losses: Vec<Loss>,
     /// Leaps of the log times of all messages, in the order in which they were read.
     pub leaps: Leaps,
+    /// Whether begins and ends of runs were recorded more than 0.25 s before or after the axis states of their stamps.
+    pub are_segments_off: bool,
 }
 
 impl Reading {
@@ -72,17 +76,36 @@ pub struct Taken<'a> {
 /// and outliers of thermometers (`outliers`) are left out and counted. A begin of a run before the end of the last one at one log
 /// time is handed on behind it (`turned`).
 pub fn read(bag: &Bag, order: Order, wanted: &[&str], take: impl FnMut(Taken<'_>)) -> Reading {
-    read_through(bag, (order, false), wanted, take)
+    read_through(bag, (order, Join::Arrival), wanted, take)
 }
 
-/// The same by log time, where axis states and readings of instruments come in the order in which they were made (`by_stamp`).
-pub fn read_by_stamp(bag: &Bag, wanted: &[&str], take: impl FnMut(Taken<'_>)) -> Reading {
-    read_through(bag, (Order::LogTime, true), wanted, take)
+/// The same by log time, where axis states and readings of instruments come in the order in which they were made (`by_stamp`);
+/// begins and ends of runs come by their stamps, or as they were recorded.
+pub fn read_by_stamp(
+    bag: &Bag,
+    wanted: &[&str],
+    are_segments_by_stamp: bool,
+    take: impl FnMut(Taken<'_>),
+) -> Reading {
+    let join = if are_segments_by_stamp {
+        Join::AllByStamp
+    } else {
+        Join::ReadingsByStamp
+    };
+    read_through(bag, (Order::LogTime, join), wanted, take)
+}
+
+/// Which messages come by their stamps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Join {
+    Arrival,
+    ReadingsByStamp,
+    AllByStamp,
 }
 
 fn read_through(
     bag: &Bag,
-    (order, is_by_stamp): (Order, bool),
+    (order, join): (Order, Join),
     wanted: &[&str],
     take: impl FnMut(Taken<'_>),
 ) -> Reading {
@@ -100,7 +123,14 @@ fn read_through(
     } else {
         WrongStamps::default()
     };
-    let by_stamp = is_by_stamp.then(|| ByStamp::new(wrong_stamps.offsets_nanos()));
+    let offsets_nanos = wrong_stamps.offsets_nanos();
+    let clock = segment_clock(&plans, offsets_nanos);
+    reading.are_segments_off = clock.is_some();
+    let by_stamp = match (join, clock) {
+        (Join::Arrival, _) => None,
+        (Join::AllByStamp, Some(clock)) => Some(ByStamp::new(offsets_nanos).with_segments(clock)),
+        _ => Some(ByStamp::new(offsets_nanos)),
+    };
     let mut reader = Reader {
         rows,
         wrong_stamps,
@@ -134,6 +164,20 @@ fn read_through(
         reader.hand_on(&held);
     }
     reading
+}
+
+/// How the stamps of begins and ends lie to those of the axis states, where both are read and differ.
+fn segment_clock(
+    plans: &[Plan],
+    offsets_nanos: &BTreeMap<usize, (i64, i64)>,
+) -> Option<SegmentClock> {
+    let number_of = |name: &str| {
+        let is_it = |plan: &Plan| matches!(plan, Plan::Read { entry, .. } if entry.name == name);
+        plans.iter().position(is_it)
+    };
+    let axes = number_of(topics::AXES_STATE.name)?;
+    let segments = number_of(topics::TEST_SEGMENT.name)?;
+    SegmentClock::of(offsets_nanos, (axes, segments))
 }
 
 /// Reads one message after another.

@@ -139,7 +139,7 @@ fn by_stamp(bag: &Bag) -> Vec<(bool, i64)> {
     ];
     let mut got = vec![];
     let mut last = None;
-    let found = reading::read_by_stamp(bag, &wanted, |mut taken| {
+    let found = reading::read_by_stamp(bag, &wanted, false, |mut taken| {
         if taken.is(&topics::AXES_STATE) {
             got.extend(
                 taken

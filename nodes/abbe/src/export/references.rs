@@ -5,8 +5,9 @@
 
 use abbe_msgs::topics;
 use control_tables::selection::Measured;
+use metrology::epoch::utc_of_nanos;
 use metrology::sample::{PositioningTable, TestKind};
-use metrology::stamp::Stamp;
+use metrology::stamp::{Host, Stamp};
 use metrology::{Axis, PerAxis};
 use recorder::Bag;
 use reports::evaluate::Tests;
@@ -30,8 +31,10 @@ pub(super) fn tables(tests: &Tests, measured: &mut Measured) -> PerAxis<Option<S
     let linear = tests.linear.iter().filter_map(of_linear);
     let rotary = tests.rotary_positioning.iter().filter_map(of_rotary);
     let mut last = PerAxis::<Option<(PositioningTable, String)>>::default();
+    let mut all = PerAxis::<Vec<String>>::default();
     for (table, said) in linear.chain(rotary) {
         let axis = table.axis;
+        all[axis].push(utc_of_nanos(table.at.nanos(), 0));
         last[axis] = Some((table, said));
     }
     let mut told = PerAxis::<Option<String>>::default();
@@ -40,11 +43,27 @@ pub(super) fn tables(tests: &Tests, measured: &mut Measured) -> PerAxis<Option<S
         if known.is_none()
             && let Some((table, said)) = last[axis].take()
         {
-            *known = Some(table);
-            told[axis] = Some(said);
+            // A table is of no instant of the control.
+            *known = Some(PositioningTable {
+                at: Stamp::from_nanos(0),
+                ..table
+            });
+            told[axis] = Some(said + &others(&all[axis]));
         }
     }
     told
+}
+
+/// Which measurement of several was taken, by the times at which they began; empty: there is one.
+fn others(began: &[String]) -> String {
+    match began {
+        [] | [_] => String::new(),
+        [before @ .., last] => format!(
+            ": the last of {} measurements in the bag, begun at {last}; not in it: {}",
+            began.len(),
+            before.join(", ")
+        ),
+    }
 }
 
 fn of_linear(test: &LinearTest) -> Option<(PositioningTable, String)> {
@@ -58,6 +77,7 @@ fn of_linear(test: &LinearTest) -> Option<(PositioningTable, String)> {
         sides: [&test.up_mm, &test.down_mm],
         mean: test.mean_mm,
         first_run: test.first_run,
+        began: test.began,
     }
     .table()
 }
@@ -70,6 +90,7 @@ fn of_rotary(test: &RotaryTest) -> Option<(PositioningTable, String)> {
         sides: [&test.up_rad, &test.down_rad],
         mean: test.mean_rad,
         first_run: test.first_run,
+        began: test.began,
     }
     .table()
 }
@@ -86,6 +107,7 @@ struct Means<'a> {
     /// That mean.
     mean: f64,
     first_run: u32,
+    began: Stamp<Host>,
 }
 
 impl Means<'_> {
@@ -114,7 +136,7 @@ impl Means<'_> {
             "positioning of {axis}: means {sides} of {n_runs} runs (run {first_run} on) of an external reference at {n} targets, {of_zero} and not corrected to 20 °C"
         );
         let table = PositioningTable {
-            at: Stamp::from_nanos(0),
+            at: Stamp::from_nanos(self.began.nanos()),
             axis,
             position: self.targets.to_vec(),
             deviation_up,
@@ -174,6 +196,7 @@ mod tests {
             axis: Some(axis),
             name: axis.letter().to_owned(),
             first_run: 1,
+            began: Stamp::from_nanos(0),
             runs: vec![1, 2],
             feed_mm_s: 100.0,
             reference,

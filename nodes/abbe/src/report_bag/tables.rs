@@ -526,6 +526,7 @@ fn a_rotary_axis_without_a_reference_says_why_it_has_no_figures() {
         up_rad: vec![],
         down_rad: vec![],
         mean_rad: 0.0,
+        began: metrology::stamp::Stamp::from_nanos(0),
         outlying: Default::default(),
         left_out: vec![],
         longest_rest: Some(metrology::stamp::Span::from_nanos(2_000_000_000)),

@@ -23,6 +23,7 @@ pub mod imported;
 pub mod limits;
 pub mod linear;
 mod not_evaluated;
+mod outside;
 pub mod paths;
 pub mod stationwise;
 pub mod stops;
@@ -39,6 +40,7 @@ use drift::{Drift, Drifts};
 use imported::Imported;
 use linear::{LinearRuns, LinearTest};
 pub use not_evaluated::NotEvaluated;
+use outside::Outside;
 use paths::{PathRecording, Paths};
 use stationwise::{StationCircle, Stationwise};
 use stops::{StopRuns, Stops};
@@ -131,11 +133,42 @@ struct Collected {
     belonging: Belonging,
     strays: Strays,
     segment: Option<TestSegment>,
+    outside: Outside,
 }
 
 impl Tests {
     /// Reads a bag; what cannot be used is left out and counted.
     pub fn of(bag: &Bag) -> Self {
+        let recorded = Self::read(bag, false);
+        if !recorded.reading.are_segments_off {
+            return recorded;
+        }
+        // Begins and ends came late, or bear another clock's stamps: the readings decide.
+        let stamped = Self::read(bag, true);
+        if stamped.values() > recorded.values() {
+            stamped
+        } else {
+            recorded
+        }
+    }
+
+    /// How many values the figures count.
+    fn values(&self) -> usize {
+        let linear = self.linear.iter();
+        let linear = linear.flat_map(|it| it.up_mm.iter().chain(&it.down_mm));
+        let rotary = self.rotary_positioning.iter();
+        let rotary = rotary.flat_map(|it| it.up_rad.iter().chain(&it.down_rad));
+        let circles = self.circles.iter().map(|it| it.points.len());
+        let paths = self.paths.iter().map(|it| it.points.len());
+        linear
+            .chain(rotary)
+            .map(Vec::len)
+            .chain(circles)
+            .chain(paths)
+            .sum()
+    }
+
+    fn read(bag: &Bag, are_segments_by_stamp: bool) -> Self {
         let machine = machine_of_bag::of(bag);
         let unreadable = machine.as_ref().err().map(ToString::to_string);
         let machine = machine.ok().flatten().map(|(machine, text)| {
@@ -149,7 +182,7 @@ impl Tests {
             ..Collected::default()
         };
         collected.tests.machine = machine;
-        let reading = reading::read_by_stamp(bag, &WANTED, |mut taken| {
+        let reading = reading::read_by_stamp(bag, &WANTED, are_segments_by_stamp, |mut taken| {
             collected.message(&mut taken);
         });
         let mut tests = collected.tests;
@@ -157,6 +190,7 @@ impl Tests {
         tests.conditions.imported = Imported::of(bag);
         tests.lose_machine(bag, unreadable);
         let runs = collected.belonging.finish(&mut tests.reading.account);
+        collected.outside.finish(&mut tests.reading.account);
         (tests.broken_off, tests.not_evaluated) = (runs.broken_off, runs.not_evaluated);
         tests.circles = collected.circles.recordings();
         let (circles, reasons) = collected.stationwise.circles();
@@ -206,6 +240,7 @@ fn temperatures_left_out(reading: &Reading) -> u64 {
 impl Collected {
     fn message(&mut self, taken: &mut Taken<'_>) {
         let is_under_way = self.segment.is_some();
+        self.outside.message(taken, is_under_way);
         self.tests.conditions.message(taken);
         if taken.is(&topics::AXES_STATE) {
             let is_needed = is_under_way || self.stationwise.listens();

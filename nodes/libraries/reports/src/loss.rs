@@ -158,6 +158,7 @@ mod tests {
             },
             losses: vec![loss],
             leaps: Leaps::default(),
+            are_segments_off: false,
         }
     }
 

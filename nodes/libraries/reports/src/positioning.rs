@@ -7,6 +7,7 @@ use iso230::positioning::single_run;
 use iso230::positioning::{PositioningRemark, PositioningResult, PositioningRuns};
 use iso230::{Direction, ExpandedLength, positioning};
 use machine::MachineFile;
+use machine::file::PositionFeedback;
 use metrology::Axis;
 use metrology::number::decimals_of;
 use metrology::sample::TestKind;
@@ -113,6 +114,11 @@ fn section(tests: &Tests, test: &LinearTest, budget: Option<&Budget>) -> Result<
     };
     let title = |name: &str| format!("{what}{name}, run {} on: {state}, {by}", test.first_run);
     let mut section = Section::new(title(&test.name));
+    if let Some(why) = closed_loop(tests, test) {
+        section.without_figures(why);
+        section.tell_left_out(&test.left_out);
+        return Ok(section);
+    }
     let runs = runs(test, periods_mm(test, tests.machine.as_ref()), measured);
     let found = match side_of(test) {
         _ if single_run::is_single(&runs) => single_run::evaluate(&runs, &measured.budget)
@@ -295,6 +301,18 @@ fn without_places(tests: &Tests, test: &LinearTest) -> Option<String> {
         format!(
             "no message of the topic {name} can be used, so it is not known where the axes were: record it together with {}",
             topics::LENGTH_POSITION.name
+        )
+    })
+}
+
+/// Why a test has no figure that was read by the scale which the control itself goes by.
+fn closed_loop(tests: &Tests, test: &LinearTest) -> Option<String> {
+    let is_by_scale = test.reference == Reference::Scale && !nothing_was_read(test);
+    let axis = test.axis.filter(|_| is_by_scale)?;
+    let entry = tests.machine.as_ref()?.linear(axis)?;
+    (entry.position_feedback == PositionFeedback::Scale).then(|| {
+        format!(
+            "the scale of {axis} closes the position loop (position_feedback: scale) and reads 0 whatever the axis is off: measure with a length reference"
         )
     })
 }

@@ -9,10 +9,12 @@ use metrology::Axis;
 use metrology::sample::{AngleSample, AxisState, TestKind, TestSegment};
 use metrology::stamp::{Host, Span, Stamp};
 
+use super::linear::against::{Pair, against};
+use super::linear::joined::{Readings, StopRead, is_by_stamp};
 use super::linear::slips::Outlying;
 use super::linear::targets::{Places, left_out, targets};
-use super::linear::unusable::{Contradiction, Extent, take_out};
-use super::linear::{STOP_SETTLE, Visits, axis_of, level};
+use super::linear::unusable::{Contradiction, Extent, take_out, why_not};
+use super::linear::{STOP_SETTLE, Visits, axis_of, is_of_one_test, level};
 
 /// A command that moves by less rests, deg.
 const SAME_DEG: f64 = 1e-6;
@@ -24,6 +26,8 @@ pub struct RotaryTest {
     pub axis: Axis,
     /// Number of its first run.
     pub first_run: u32,
+    /// When that began.
+    pub began: Stamp<Host>,
     /// Targets, ascending, rad.
     pub targets_rad: Vec<f64>,
     /// Deviations per run and target towards greater angles, their mean over all taken out, rad.
@@ -54,6 +58,8 @@ struct Stop {
     first_rad: f64,
     /// Of the readings less the first one.
     extent: Extent,
+    /// How far two readings of one stamp lie apart, where they contradict each other, rad.
+    clash_rad: Option<f64>,
     n: u32,
 }
 
@@ -62,6 +68,8 @@ struct Run {
     begin: TestSegment,
     axis: Axis,
     stops: Vec<Stop>,
+    /// Every reading, rad.
+    angles: Readings,
 }
 
 /// Collects the runs of a recording.
@@ -81,12 +89,13 @@ impl RotaryRuns {
                 begin: segment.clone(),
                 axis,
                 stops: vec![],
+                angles: Readings::default(),
             });
         } else if let Some(run) = self.current.take()
             && segment.completed
             && segment.run == run.begin.run
         {
-            self.done.push(run);
+            self.done.push(run.joined());
         }
     }
 
@@ -118,6 +127,7 @@ impl RotaryRuns {
                     sum_rad: 0.0,
                     first_rad: 0.0,
                     extent: Extent::default(),
+                    clash_rad: None,
                     n: 0,
                 });
             }
@@ -128,27 +138,22 @@ impl RotaryRuns {
     pub fn angle(&mut self, sample: &AngleSample) {
         if let Some(run) = &mut self.current
             && sample.axis == run.axis
-            && let Some(stop) = run.stops.last_mut()
-            && sample.at - stop.since >= STOP_SETTLE
         {
-            if stop.n == 0 {
-                stop.first_rad = sample.angle_rad;
+            run.angles.take(sample.at, sample.angle_rad);
+            if let Some(stop) = run.stops.last_mut()
+                && sample.at - stop.since >= STOP_SETTLE
+            {
+                stop.take(sample.angle_rad);
             }
-            let beside_rad = within_half_a_turn_rad(sample.angle_rad - stop.first_rad);
-            stop.sum_rad += beside_rad;
-            stop.extent.add(beside_rad);
-            stop.n += 1;
         }
     }
 
     /// The tests: runs that repeat one another belong together.
     #[must_use]
     pub fn tests(self) -> Vec<RotaryTest> {
-        let groups = self.done.chunk_by(|a, b| {
-            a.axis == b.axis
-                && a.begin.features == b.begin.features
-                && b.begin.repeat == a.begin.repeat + 1
-        });
+        let groups = self
+            .done
+            .chunk_by(|a, b| a.axis == b.axis && is_of_one_test(&a.begin, &b.begin));
         groups.filter_map(test).collect()
     }
 }
@@ -163,8 +168,11 @@ fn test(group: &[Run]) -> Option<RotaryTest> {
         .map(|run| visits(run, zero_rad.unwrap_or(0.0), &places))
         .collect();
     let mut numbers: Vec<u32> = group.iter().map(|run| run.begin.run).collect();
-    let contradictory: Vec<Vec<Contradiction>> = group.iter().map(Run::contradictions).collect();
-    let unusable = take_out(&mut runs, &mut numbers, &contradictory);
+    let own = group.iter().map(|run| {
+        let against = against(false, &run.pairs());
+        why_not(&run.contradictions(), against)
+    });
+    let unusable = take_out(&mut runs, &mut numbers, own.collect());
     let (targets, sides) = targets(&runs);
     let mut left_out = left_out(&runs, &numbers, (&targets, sides), (&places, "deg"));
     let of = |side: usize| {
@@ -184,6 +192,7 @@ fn test(group: &[Run]) -> Option<RotaryTest> {
     Some(RotaryTest {
         axis: first.axis,
         first_run: first.begin.run,
+        began: first.begin.at,
         targets_rad,
         up_rad,
         down_rad,
@@ -196,14 +205,49 @@ fn test(group: &[Run]) -> Option<RotaryTest> {
 }
 
 impl Run {
+    /// The same, where each reading belongs to one stop.
+    fn joined(mut self) -> Self {
+        self.angles.sort();
+        let stamped: Vec<Stop> = (self.stops.iter())
+            .map(|stop| stop.with(self.angles.within(stop.since, stop.until)))
+            .collect();
+        if is_by_stamp(&reads(&self.stops), &reads(&stamped)) {
+            self.stops = stamped;
+        }
+        for stop in &mut self.stops {
+            stop.clash_rad = self.angles.clash(false, (stop.since, stop.until));
+        }
+        self.angles = Readings::default();
+        self
+    }
+
+    /// The stops with readings, their deviations without whole turns from one to the next.
+    fn pairs(&self) -> Vec<Pair> {
+        let mut deviation = None;
+        let read = self.stops.iter().filter(|stop| stop.is_approach());
+        let pairs = read.filter_map(|stop| {
+            let own = stop.deviation_rad()?;
+            let last = *deviation.get_or_insert(own);
+            let next = last + within_half_a_turn_rad(own - last);
+            deviation = Some(next);
+            Some(Pair {
+                at: stop.at_rad,
+                deviation: next,
+            })
+        });
+        pairs.collect()
+    }
+
     /// The stops whose readings contradict each other.
     fn contradictions(&self) -> Vec<Contradiction> {
         let of = |stop: &Stop| {
+            let apart_rad = stop.extent.contradiction(false);
             Some(Contradiction {
                 is_linear: false,
                 at: stop.at_deg(),
                 is_up: stop.way_deg() > 0.0,
-                apart: stop.extent.contradiction(false)?,
+                apart: apart_rad.or(stop.clash_rad)?,
+                is_of_one_stamp: apart_rad.is_none(),
             })
         };
         let stops = self.stops.iter().filter(|stop| stop.is_approach());
@@ -211,7 +255,44 @@ impl Run {
     }
 }
 
+/// What the angular reference read at the stops, without whole turns from the first one.
+fn reads(stops: &[Stop]) -> Vec<StopRead> {
+    let read = || stops.iter().filter(|stop| stop.n > 0);
+    let zero_rad = read().find_map(Stop::deviation_rad).unwrap_or(0.0);
+    let all = read().filter_map(|stop| {
+        Some(StopRead {
+            extent: stop.extent,
+            deviation: within_half_a_turn_rad(stop.deviation_rad()? - zero_rad),
+            n: stop.n,
+        })
+    });
+    all.collect()
+}
+
 impl Stop {
+    fn take(&mut self, angle_rad: f64) {
+        if self.n == 0 {
+            self.first_rad = angle_rad;
+        }
+        let beside_rad = within_half_a_turn_rad(angle_rad - self.first_rad);
+        self.sum_rad += beside_rad;
+        self.extent.add(beside_rad);
+        self.n += 1;
+    }
+
+    /// The same with these readings, rad.
+    fn with(&self, angles_rad: impl Iterator<Item = f64>) -> Self {
+        let mut stop = Self {
+            sum_rad: 0.0,
+            first_rad: 0.0,
+            extent: Extent::default(),
+            n: 0,
+            ..*self
+        };
+        angles_rad.for_each(|angle_rad| stop.take(angle_rad));
+        stop
+    }
+
     fn at_deg(&self) -> f64 {
         self.at_rad.to_degrees()
     }

@@ -13,13 +13,17 @@ use metrology::sample::{AxisState, LengthSample, TestKind, TestSegment};
 use metrology::stamp::{Host, Span, Stamp};
 use nalgebra::Vector3;
 
+pub(super) mod against;
+pub(super) mod joined;
 pub mod slips;
 pub(super) mod targets;
 pub(super) mod unusable;
 
+use against::{Pair, against};
+use joined::{Readings, StopRead, is_by_stamp};
 use slips::Outlying;
 use targets::{Places, left_out, targets};
-use unusable::{Contradiction, Extent, take_out};
+use unusable::{Contradiction, Extent, take_out, why_not};
 
 /// Rest after which readings count.
 pub const STOP_SETTLE: Span = Span::from_nanos(300_000_000);
@@ -46,6 +50,8 @@ pub struct LinearTest {
     pub name: String,
     /// Number of its first run.
     pub first_run: u32,
+    /// When that began.
+    pub began: Stamp<Host>,
     /// Numbers of all its runs that count.
     pub runs: Vec<u32>,
     /// Programmed feed, mm/s.
@@ -83,6 +89,7 @@ impl LinearTest {
             axis: Some(Axis::X),
             name: "X".to_owned(),
             first_run: run,
+            began: Stamp::from_nanos(0),
             runs: vec![run],
             feed_mm_s: 100.0,
             reference: Reference::Length,
@@ -110,6 +117,8 @@ struct Stop {
     until: Stamp<Host>,
     sum_mm: f64,
     extent: Extent,
+    /// How far two readings of one stamp lie apart, where they contradict each other, mm.
+    clash_mm: Option<f64>,
     scale_sum_mm: Vector3<f64>,
     n: u32,
     n_scale: u32,
@@ -123,7 +132,20 @@ struct Reading {
     length_mm: Option<f64>,
     /// How far its readings of the length lie apart, where they contradict each other, mm.
     apart_mm: Option<f64>,
+    /// The same of two readings of one stamp.
+    clash_mm: Option<f64>,
     scale_mm: Vector3<f64>,
+}
+
+/// A run while it is read.
+#[derive(Clone, Debug, Default)]
+struct Course {
+    /// Rests with readings, or long enough to have some.
+    passed: Vec<Stop>,
+    /// Every reading of the length.
+    lengths: Readings,
+    /// Where and how long the command rested, of rests of two states or more.
+    rests: Vec<(Vector3<f64>, Span)>,
 }
 
 /// One run: where the command rested and what was read there.
@@ -134,14 +156,56 @@ struct Run {
     rests: Vec<(Vector3<f64>, Span)>,
 }
 
-impl Run {
+impl Course {
     fn add(&mut self, stop: Stop) {
         if stop.until > stop.since {
             self.rests.push((stop.place_mm, stop.until - stop.since));
         }
-        self.stops.extend(stop.read());
+        if stop.n > 0 || stop.n_scale > 0 || stop.until - stop.since >= STOP_SETTLE {
+            self.passed.push(stop);
+        }
     }
 
+    /// The run, where each reading belongs to one stop.
+    fn finished(mut self, axis: Option<Axis>) -> Run {
+        self.lengths.sort();
+        let stamped: Vec<Stop> = (self.passed.iter())
+            .map(|stop| stop.with(self.lengths.within(stop.since, stop.until)))
+            .collect();
+        let mut stops = if is_by_stamp(&reads(&self.passed, axis), &reads(&stamped, axis)) {
+            stamped
+        } else {
+            self.passed
+        };
+        for stop in &mut stops {
+            stop.clash_mm = self.lengths.clash(true, (stop.since, stop.until));
+        }
+        Run {
+            stops: stops.into_iter().filter_map(Stop::read).collect(),
+            rests: self.rests,
+        }
+    }
+}
+
+/// What the length reference read at the stops.
+fn reads(stops: &[Stop], axis: Option<Axis>) -> Vec<StopRead> {
+    let read = || stops.iter().filter(|stop| stop.n > 0);
+    let first_mm = read().next().map_or_else(Vector3::zeros, |it| it.place_mm);
+    let all = read().map(|stop| {
+        let along_mm = match axis {
+            Some(axis) => stop.place_mm[axis.index()],
+            None => (stop.place_mm - first_mm).norm(),
+        };
+        StopRead {
+            extent: stop.extent,
+            deviation: stop.sum_mm / f64::from(stop.n) - along_mm,
+            n: stop.n,
+        }
+    });
+    all.collect()
+}
+
+impl Run {
     /// Before the first way and behind the last one the machine may stand for any time.
     fn longest_rest(&self) -> Option<Span> {
         let within = self.rests.len().saturating_sub(1);
@@ -153,7 +217,7 @@ impl Run {
 /// Collects the runs of a recording.
 #[derive(Debug, Default)]
 pub struct LinearRuns {
-    current: Option<(TestSegment, Run, Option<Stop>, bool)>,
+    current: Option<(TestSegment, Course, Option<Stop>, bool)>,
     done: Vec<(TestSegment, Run, bool)>,
 }
 
@@ -164,13 +228,14 @@ impl LinearRuns {
             let is_linear = axis_of(segment).is_none_or(Axis::is_linear);
             self.current = (is_linear
                 && matches!(segment.kind, TestKind::Positioning | TestKind::Diagonal))
-            .then(|| (segment.clone(), Run::default(), None, false));
+            .then(|| (segment.clone(), Course::default(), None, false));
         } else if let Some((begin, mut run, stop, compensated)) = self.current.take()
             && segment.completed
             && segment.run == begin.run
         {
             stop.into_iter().for_each(|stop| run.add(stop));
-            self.done.push((begin, run, compensated));
+            let axis = axis_of(&begin);
+            self.done.push((begin, run.finished(axis), compensated));
         }
     }
 
@@ -207,6 +272,7 @@ impl LinearRuns {
                     until: state.received_at,
                     sum_mm: 0.0,
                     extent: Extent::default(),
+                    clash_mm: None,
                     scale_sum_mm: Vector3::zeros(),
                     n: 0,
                     n_scale: 0,
@@ -217,12 +283,14 @@ impl LinearRuns {
 
     /// One reading of the length reference.
     pub fn length(&mut self, sample: &LengthSample) {
-        if let Some((_, _, Some(stop), _)) = &mut self.current
+        let Some((_, run, stop, _)) = &mut self.current else {
+            return;
+        };
+        run.lengths.take(sample.at, sample.displacement_mm);
+        if let Some(stop) = stop
             && sample.at - stop.since >= STOP_SETTLE
         {
-            stop.sum_mm += sample.displacement_mm;
-            stop.extent.add(sample.displacement_mm);
-            stop.n += 1;
+            stop.take(sample.displacement_mm);
         }
     }
 
@@ -234,10 +302,7 @@ impl LinearRuns {
             let goes_on = groups
                 .last()
                 .and_then(|group| group.last())
-                .is_some_and(|last| {
-                    let alike = last.0.kind == run.0.kind && last.0.features == run.0.features;
-                    alike && run.0.repeat == last.0.repeat + 1
-                });
+                .is_some_and(|last| last.0.kind == run.0.kind && is_of_one_test(&last.0, &run.0));
             match groups.last_mut().filter(|_| goes_on) {
                 Some(group) => group.push(run),
                 None => groups.push(vec![run]),
@@ -247,7 +312,34 @@ impl LinearRuns {
     }
 }
 
+/// Whether a run repeats the one before it: along the same axis with the same offset, set-up and feed.
+pub(super) fn is_of_one_test(last: &TestSegment, run: &TestSegment) -> bool {
+    run.features == last.features
+        && run.repeat == last.repeat + 1
+        && run.setup_id == last.setup_id
+        && (run.tool_offset_mm - last.tool_offset_mm).amax() < SAME_MM
+        && (run.feed_mm_s - last.feed_mm_s).abs() < SAME_MM
+}
+
 impl Stop {
+    fn take(&mut self, length_mm: f64) {
+        self.sum_mm += length_mm;
+        self.extent.add(length_mm);
+        self.n += 1;
+    }
+
+    /// The same with these readings of the length.
+    fn with(&self, lengths_mm: impl Iterator<Item = f64>) -> Self {
+        let mut stop = Self {
+            sum_mm: 0.0,
+            extent: Extent::default(),
+            n: 0,
+            ..*self
+        };
+        lengths_mm.for_each(|length_mm| stop.take(length_mm));
+        stop
+    }
+
     fn read(self) -> Option<Reading> {
         let length_mm = (self.n > 0).then(|| self.sum_mm / f64::from(self.n));
         let scale_mm = if self.n_scale > 0 {
@@ -260,6 +352,7 @@ impl Stop {
             from_mm: self.from_mm,
             length_mm,
             apart_mm: self.extent.contradiction(true),
+            clash_mm: self.clash_mm,
             scale_mm,
         })
     }
@@ -288,9 +381,8 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
     let places = Places::of(read.iter().flatten().map(|one| one.along_mm));
     let mut runs: Vec<Visits> = read.iter().map(|run| visits(run, &places)).collect();
     let mut numbers: Vec<u32> = group.iter().map(|(segment, ..)| segment.run).collect();
-    let contradictory: Vec<Vec<Contradiction>> =
-        read.iter().map(|run| contradictions(run)).collect();
-    let unusable = take_out(&mut runs, &mut numbers, &contradictory);
+    let own = read.iter().map(|run| reason_against(run, reference));
+    let unusable = take_out(&mut runs, &mut numbers, own.collect());
     let (targets, sides) = targets(&runs);
     let mut left_out = left_out(&runs, &numbers, (&targets, sides), (&places, "mm"));
     let of = |side: usize| {
@@ -312,6 +404,7 @@ fn test(group: &[(TestSegment, Run, bool)]) -> Option<LinearTest> {
         axis,
         name: first.features.join(" "),
         first_run: first.run,
+        began: first.at,
         runs: numbers,
         feed_mm_s: first.feed_mm_s,
         reference,
@@ -361,6 +454,24 @@ struct Approach {
     deviation_mm: f64,
     upwards: bool,
     apart_mm: Option<f64>,
+    clash_mm: Option<f64>,
+}
+
+/// Why a run cannot be used by itself.
+fn reason_against(run: &[Approach], reference: Reference) -> Option<String> {
+    let pairs: Vec<Pair> = run.iter().map(Approach::pair).collect();
+    let is_by_length = reference == Reference::Length;
+    let against = is_by_length.then(|| against(true, &pairs)).flatten();
+    why_not(&contradictions(run), against)
+}
+
+impl Approach {
+    fn pair(&self) -> Pair {
+        Pair {
+            at: self.along_mm,
+            deviation: self.deviation_mm,
+        }
+    }
 }
 
 fn approaches(
@@ -387,6 +498,7 @@ fn approaches(
             deviation_mm: read_mm - along_mm,
             upwards: way_mm > 0.0,
             apart_mm: stop.apart_mm.filter(|_| reference == Reference::Length),
+            clash_mm: stop.clash_mm.filter(|_| reference == Reference::Length),
         })
     };
     run.stops.iter().filter_map(approach).collect()
@@ -399,7 +511,8 @@ fn contradictions(run: &[Approach]) -> Vec<Contradiction> {
             is_linear: true,
             at: approach.along_mm,
             is_up: approach.upwards,
-            apart: approach.apart_mm?,
+            apart: approach.apart_mm.or(approach.clash_mm)?,
+            is_of_one_stamp: approach.apart_mm.is_none(),
         })
     };
     run.iter().filter_map(of).collect()

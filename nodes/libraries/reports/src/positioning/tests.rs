@@ -20,6 +20,7 @@ pub(super) fn test(direction: [f64; 3]) -> LinearTest {
         targets_mm: vec![0.0, 100.0, 300.0],
         up_mm: vec![vec![0.0, 0.001, 0.003]],
         mean_mm: 0.0,
+        began: metrology::stamp::Stamp::from_nanos(0),
         outlying: Default::default(),
         down_mm: vec![vec![0.002, 0.003, 0.005]],
         left_out: vec![],
@@ -224,6 +225,24 @@ fn what_the_machines_own_scale_read_is_labelled_and_has_the_scales_uncertainty_o
     );
     assert!((stated_um - 1.8).abs() < 1e-6, "{stated_um}");
     assert_eq!(section.figures["label"], BY_OWN_SCALE);
+}
+
+#[test]
+fn the_scale_that_closes_the_loop_gives_no_figure_and_says_why() {
+    let mut tests = warm(Reference::Scale, &UNEVEN_MM);
+    let by_scale = MACHINE.replacen(
+        "encoder_resolution_um: 0.05",
+        "encoder_resolution_um: 0.05, scale_resolution_um: 0.05, position_feedback: scale",
+        1,
+    );
+    tests.machine = Some(MachineFile::parse(&by_scale, "machine.yaml").unwrap());
+    let section = sections(&tests, Some(&budget())).unwrap().remove(0);
+    let why = section.unevaluated.unwrap();
+    assert!(
+        why.starts_with("the scale of X closes the position loop"),
+        "{why}"
+    );
+    assert!(section.figures["iso230_2"].is_null());
 }
 
 #[test]

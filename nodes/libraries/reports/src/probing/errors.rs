@@ -41,10 +41,17 @@ struct Found {
     /// Whether one of its touches is of something else.
     #[serde(skip)]
     has_slip: bool,
+    /// A touch far from the others, which every figure counts.
+    #[serde(skip)]
+    far: Option<String>,
 }
 
 /// Greatest form error of a shape that was touched, mm: beyond it a touch is of something else, or was latched wrongly.
 const GREATEST_FORM_MM: f64 = 0.5;
+/// A touch is far from the others that makes the form error this many times as great.
+const FAR_FORMS: f64 = 10.0;
+/// None is far where the form error is smaller, mm.
+const LEAST_FAR_FORM_MM: f64 = 0.01;
 
 /// The part, where a round shape was touched.
 pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section> {
@@ -76,6 +83,8 @@ pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section>
         }
         let slipped = found.iter().find(|one| one.has_slip);
         section.unevaluated = slipped.and_then(|one| one.not_evaluated.clone());
+        let far: Vec<String> = found.iter().filter_map(|one| one.far.clone()).collect();
+        section.name_far(&far);
         section.tables.push(Rows {
             head: head(&[
                 "feature",
@@ -260,6 +269,7 @@ fn evaluated(
     // A centre and a radius.
     let n_unknowns = if is_sphere { 4 } else { 3 };
     let slip = slip(&points, n_unknowns, form_mm);
+    let far = far(&points, n_unknowns, form_mm).filter(|_| slip.is_none());
     let (why, result) = match (of(&points), &slip) {
         (Ok(_), Some(why)) => (Some(why.clone()), None),
         (Ok(result), None) => (None, Some(result)),
@@ -286,7 +296,44 @@ fn evaluated(
         certificate: certificate.map(|one| one.number.clone().unwrap_or_default()),
         not_evaluated: why,
         has_slip: slip.is_some(),
+        far: far.map(|far| format!("{}, run {}: {far}", feature.feature_id, feature.run)),
     }
+}
+
+/// The touch without which the others are nearest to a shape, and their form error then, mm.
+fn farthest(
+    points: &[Vector3<f64>],
+    form_mm: impl Fn(&[Vector3<f64>]) -> Option<f64>,
+) -> Option<(usize, f64)> {
+    let without = |out: usize| {
+        let mut others = points.to_vec();
+        others.remove(out);
+        Some((out, form_mm(&others)?))
+    };
+    let nearest = (0..points.len()).filter_map(without);
+    nearest.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// The touch of a shape that is far from the others, in words; `None`: there is none, or so few that none can be named.
+fn far(
+    points: &[Vector3<f64>],
+    n_unknowns: usize,
+    form_mm: impl Fn(&[Vector3<f64>]) -> Option<f64>,
+) -> Option<String> {
+    let found_mm = form_mm(points).filter(|mm| *mm > LEAST_FAR_FORM_MM)?;
+    if points.len() < n_unknowns + 3 {
+        return None;
+    }
+    let (place, left_mm) = farthest(points, &form_mm)?;
+    (found_mm > FAR_FORMS * left_mm).then(|| {
+        format!(
+            "touch {} of {} makes the form error {} µm, which is {} µm without it. It is in every figure; repeat the measurement where it is a slip",
+            place + 1,
+            points.len(),
+            um(found_mm),
+            um(left_mm)
+        )
+    })
 }
 
 /// Why touches are not those of one shape: the one without which the others are nearest to it.
@@ -305,13 +352,7 @@ fn slip(
             points.len()
         ));
     }
-    let without = |out: usize| {
-        let mut others = points.to_vec();
-        others.remove(out);
-        Some((out, form_mm(&others)?))
-    };
-    let nearest = (0..points.len()).filter_map(without);
-    let (place, left_mm) = nearest.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (place, left_mm) = farthest(points, &form_mm)?;
     let at = points[place].iter().map(|mm| number(*mm));
     Some(format!(
         "form error of {} µm, at most {} µm: touch {} of {}, at ({}) mm, is the farthest from the others, which have {} µm without it: \
@@ -510,6 +551,14 @@ environmental_drift_um: 0.6
         };
         let mut points: Vec<Vector3<f64>> = (0..25).map(sphere).collect();
         assert_eq!(slip(&points, 4, form_mm), None);
+        assert_eq!(far(&points, 4, form_mm), None);
+        let sound = points[17];
+        points[17] *= 1.008;
+        assert_eq!(slip(&points, 4, form_mm), None);
+        let named = far(&points, 4, form_mm).unwrap();
+        let words = "touch 18 of 25 makes the form error 100.00 µm, which is 0.00 µm without it";
+        assert!(named.starts_with(words), "{named}");
+        points[17] = sound;
         points[17].x = 0.0;
         let few = slip(&points[14..20], 4, form_mm).unwrap();
         assert!(few.contains("one of its 6 touches"), "{few}");

@@ -14,6 +14,7 @@ fn a_rotary_test_has_its_reference_and_its_dwell_among_the_conditions() {
             up_rad: vec![],
             down_rad: vec![],
             mean_rad: 0.0,
+            began: metrology::stamp::Stamp::from_nanos(0),
             outlying: Default::default(),
             left_out: vec![],
             longest_rest: Some(Span::from_nanos(2_000_000_000)),

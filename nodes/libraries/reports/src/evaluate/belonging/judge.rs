@@ -129,7 +129,7 @@ impl Open {
             return Judged::Counts;
         };
         let what = format!(
-            "its stamp is {} s off the axis states of run {}: at most {LATE_S} s; the clocks of both must be one: synchronise them",
+            "its stamp is {} s off that of the axis states beside which it was recorded, in run {}: at most {LATE_S} s; synchronise the clocks, or record both without delay",
             number(off_s),
             self.begin.run
         );

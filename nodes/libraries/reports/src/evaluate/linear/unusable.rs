@@ -9,6 +9,7 @@ use std::fmt;
 use iso230::positioning::whole_runs::{is_broken_off, n_of_complete};
 
 use super::Visits;
+use super::joined::SAME_STAMP_APART;
 use super::slips::{SLIP, size};
 
 /// Least and greatest reading of one stop, mm or rad.
@@ -22,9 +23,14 @@ impl Extent {
         self.0 = Some([low.min(reading), high.max(reading)]);
     }
 
+    /// How far its readings lie apart; `None`: it has none.
+    pub(in crate::evaluate) fn size(self) -> Option<f64> {
+        self.0.map(|[low, high]| high - low)
+    }
+
     /// How far its readings lie apart, where that is more than a slip; the limit is that of a linear axis or of a rotary one.
     pub(in crate::evaluate) fn contradiction(self, is_linear: bool) -> Option<f64> {
-        let apart = self.0.map(|[low, high]| high - low)?;
+        let apart = self.size()?;
         (apart > SLIP[usize::from(!is_linear)]).then_some(apart)
     }
 }
@@ -40,6 +46,8 @@ pub(in crate::evaluate) struct Contradiction {
     pub is_up: bool,
     /// Greatest difference of its readings, mm or rad.
     pub apart: f64,
+    /// Whether that is of two readings of one stamp.
+    pub is_of_one_stamp: bool,
 }
 
 impl fmt::Display for Contradiction {
@@ -49,9 +57,19 @@ impl fmt::Display for Contradiction {
             at,
             is_up,
             apart,
+            is_of_one_stamp,
         } = *self;
         let unit = if is_linear { "mm" } else { "deg" };
         let way = if is_up { "up" } else { "down" };
+        if is_of_one_stamp {
+            return write!(
+                f,
+                "two readings of one stamp at the stop at {at:.3} {unit} {way} differ by {}, at most {}: two instruments or recordings wrote them: \
+                 separate them",
+                size(is_linear, apart),
+                size(is_linear, SAME_STAMP_APART[usize::from(!is_linear)])
+            );
+        }
         write!(
             f,
             "readings of the stop at {at:.3} {unit} {way} differ by {}, at most {}: two instruments or clocks wrote them, or the beam was lost: \
@@ -62,31 +80,44 @@ impl fmt::Display for Contradiction {
     }
 }
 
-/// Takes runs out that cannot be used: those of which a stop contradicts itself, and those that were broken off. Numbers and reasons of
-/// these; `contradictions` has those of each run.
+/// Why a run cannot be used by itself: stops that contradict themselves, or readings that do not go with the axis.
+pub(in crate::evaluate) fn why_not(
+    contradictions: &[Contradiction],
+    against: Option<String>,
+) -> Option<String> {
+    match contradictions {
+        [] => against,
+        [first] => Some(first.to_string()),
+        [first, others @ ..] => Some(format!(
+            "{first}; {} more such stops of this run",
+            others.len()
+        )),
+    }
+}
+
+/// Takes runs out that cannot be used: those of which `own` has the reason, and those that were broken off. Numbers and reasons of
+/// these.
 pub(in crate::evaluate) fn take_out(
     runs: &mut Vec<Visits>,
     numbers: &mut Vec<u32>,
-    contradictions: &[Vec<Contradiction>],
+    own: Vec<Option<String>>,
 ) -> Vec<(u32, String)> {
     let n_read = |run: &Visits| -> usize {
         let sides = run.values().flatten();
         sides.filter(|readings| !readings.is_empty()).count()
     };
     let n_complete = n_of_complete(runs.iter().map(n_read).collect());
-    let why_not = |(run, own): (&Visits, &Vec<Contradiction>)| {
+    let why = |(run, own): (&Visits, Option<String>)| {
         let n = n_read(run);
-        match own.as_slice() {
-            [] => is_broken_off(n, n_complete).then(|| {
+        own.or_else(|| {
+            is_broken_off(n, n_complete).then(|| {
                 format!(
                     "it has {n} readings where a complete run has {n_complete}: it was broken off, and is left out whole: repeat the run"
                 )
-            }),
-            [first] => Some(first.to_string()),
-            [first, others @ ..] => Some(format!("{first}; {} more such stops of this run", others.len())),
-        }
+            })
+        })
     };
-    let reasons: Vec<Option<String>> = runs.iter().zip(contradictions).map(why_not).collect();
+    let reasons: Vec<Option<String>> = runs.iter().zip(own).map(why).collect();
     let mut usable = reasons.iter().map(Option::is_none);
     runs.retain(|_| usable.next().unwrap_or(true));
     let mut usable = reasons.iter().map(Option::is_none);
@@ -125,6 +156,7 @@ mod tests {
             at: -280.0,
             is_up: true,
             apart: 40.159,
+            is_of_one_stamp: false,
         };
         let said = one.to_string();
         let words = "readings of the stop at -280.000 mm up differ by 40159 µm, at most 500 µm: ";
