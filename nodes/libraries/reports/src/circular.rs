@@ -125,6 +125,10 @@ fn section(
         return Ok((section, None));
     }
     section.lines.extend(turn::lines(group));
+    let far: Vec<String> = { group.iter() }
+        .filter_map(|circle| refused::far(circle))
+        .collect();
+    section.name_far(&far);
     let test = at_20_degc(group, &reading.measured.correction);
     let evaluated = evaluate(&test, &reading.measured.budget);
     match &evaluated {
@@ -147,7 +151,7 @@ fn section(
     Ok((section, result))
 }
 
-/// Whether a circle has no outlier.
+/// Whether a circle has no outlier and its radius.
 fn is_sound(circle: &CircleRecording) -> bool {
     refused::outlier(circle).is_none()
 }
@@ -186,6 +190,7 @@ fn state_figures(
     section.answers.push(in_short(result, reading.is_stated()));
     section.tables.push(figures(result, reading));
     let correction = &reading.measured.correction;
+    correction.name_far(section);
     let line = format!("F and D: {}", correction.in_words(test.nominal_radius_mm));
     if correction.lacks().is_some() {
         section.warn(NOT_CORRECTED, line);

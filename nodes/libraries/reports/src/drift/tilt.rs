@@ -7,6 +7,7 @@ use anyhow::Result;
 use iso230::thermal::{self, AngularDrift, DriftChannel, DriftTest};
 use iso230::{ExpandedAngle, ExpandedAngularRate, Iso230Error};
 use metrology::Axis;
+use metrology::number::number;
 use metrology::stamp::{Host, Stamp};
 use serde::Serialize;
 use serde_json::json;
@@ -18,6 +19,9 @@ use crate::evaluate::budget::{Budget, unstate};
 use crate::evaluate::drift::{Drift, DriftLog};
 use crate::plot::{self, Plot, Trace};
 use crate::section::{Drawing, Rows, Section, head};
+
+/// Least distance of two heights, mm: a tilt by nearer sensors is their noise, or the heights are in metres.
+const LEAST_APART_MM: f64 = 5.0;
 
 /// One angle, evaluated.
 #[derive(Debug, Serialize)]
@@ -119,7 +123,20 @@ impl<'a> Pair<'a> {
         self.at.iter().map(since).collect()
     }
 
+    fn check_heights(&self) -> Result<(), String> {
+        let [low_mm, high_mm] = self.heights_mm();
+        if high_mm - low_mm < LEAST_APART_MM {
+            return Err(format!(
+                "heights_mm = [{}, {}]: at least {LEAST_APART_MM} mm apart; state heights in mm",
+                number(low_mm),
+                number(high_mm)
+            ));
+        }
+        Ok(())
+    }
+
     fn figures(&self, budget: Option<&Budget>) -> Result<Figures, String> {
+        self.check_heights()?;
         if self.lower.zeroed_anew || self.upper.zeroed_anew {
             return Err("one of the two instruments was zeroed anew while it went on".to_owned());
         }
@@ -346,6 +363,19 @@ mod tests {
 
     fn budget() -> Budget {
         Budget::read(BUDGET, Path::new("budget.yaml")).unwrap()
+    }
+
+    #[test]
+    fn heights_in_metres_give_no_tilt() {
+        for (low_mm, high_mm) in [(0.110, 0.260), (110.0, 110.001), (110.0, 114.9)] {
+            let logs = vec![
+                log(Axis::X, low_mm, |h| 1.5e-3 * h),
+                log(Axis::X, high_mm, |h| 3e-3 * h),
+            ];
+            let section = sections(&drift(logs), None).unwrap().remove(0);
+            let said = section.terminal();
+            assert!(said.contains("at least 5 mm apart"), "{said}");
+        }
     }
 
     #[test]

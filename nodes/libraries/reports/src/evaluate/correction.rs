@@ -6,6 +6,7 @@ use iso230::positioning::budget::PositioningBudget;
 use machine::MachineFile;
 use machine::file::PositionFeedback;
 use metrology::Axis;
+use metrology::number::number;
 use serde_json::{Value, json};
 
 use super::Tests;
@@ -176,6 +177,11 @@ impl Measured {
     }
 }
 
+/// A stated temperature farther from 20 °C may be the temperature itself, K.
+const FAR_FROM_20_DEGC_K: f64 = 10.0;
+/// What warnings of such temperatures have in common.
+const FAR_FROM_20_DEGC: &str = "Far from 20 °C";
+
 /// What warnings of lengths that are not those at 20 °C have in common.
 pub const NOT_AT_20_DEGC: &str = "Not corrected to 20 °C";
 
@@ -198,6 +204,7 @@ impl Measured {
 
     /// Says what corrects the lengths of a test over `span_mm`, as a warning where nothing does.
     pub fn state_correction(&self, section: &mut Section, span_mm: f64) {
+        self.correction.name_far(section);
         let line = self.correction.in_words(span_mm);
         if self.is_by_own_scale || self.correction.lacks().is_none() {
             section.lines.push(line);
@@ -333,6 +340,35 @@ impl Correction {
         match self {
             Self::Missing { reason } => Some(format!("not corrected to 20 °C: {reason}")),
             Self::Here { .. } | Self::ByInstrument => None,
+        }
+    }
+
+    /// Names temperatures of the budget that are so far from 20 °C that they may be no deviations from it.
+    pub fn name_far(&self, section: &mut Section) {
+        let Self::Here {
+            carrier,
+            machine,
+            device,
+            ..
+        } = self
+        else {
+            return;
+        };
+        let device_key = "device".to_owned();
+        for (key, (temperature, expansion_per_k)) in
+            [(carrier.key(), machine), (device_key, device)]
+        {
+            let is_stated = temperature.range_k.is_none() && *expansion_per_k > 0.0;
+            if is_stated && temperature.deviation_k.abs() > FAR_FROM_20_DEGC_K {
+                section.warn(
+                    FAR_FROM_20_DEGC,
+                    format!(
+                        "{key}.temperature_deviation_k = {} K of the budget file is a temperature of {} °C: it is counted from 20 °C; correct it where it is the temperature itself.",
+                        number(temperature.deviation_k),
+                        number(20.0 + temperature.deviation_k)
+                    ),
+                );
+            }
         }
     }
 

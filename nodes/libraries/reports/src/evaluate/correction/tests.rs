@@ -198,3 +198,19 @@ fn without_temperatures_the_reason_names_what_to_state() {
     assert!(own.correction.lacks().unwrap().contains("own scale"));
     assert!(!own.is_stated);
 }
+
+#[test]
+fn a_temperature_far_from_20_degc_that_the_budget_states_is_named_with_its_key() {
+    let of = |text: &str| {
+        let mut section = Section::new("X".to_owned());
+        let correction = measured(Some(text), Reference::Length).correction;
+        correction.name_far(&mut section);
+        section.warnings
+    };
+    assert!(of(BUDGET).is_empty());
+    let warm = |k: &str| BUDGET.replacen("temperature_deviation_k: 2.0", k, 1);
+    assert!(of(&warm("temperature_deviation_k: 9.9")).is_empty());
+    let found = of(&warm("temperature_deviation_k: 22.0"));
+    let words = "temperature_deviation_k = 22 K of the budget file is a temperature of 42 °C";
+    assert!(found[0].line.contains(words), "{found:?}");
+}
