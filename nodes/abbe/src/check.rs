@@ -185,7 +185,30 @@ fn page(path: &Path, outcome: &Outcome) -> String {
         Some(line) => format!("\n{line}: no timer ran through a leap"),
         None => String::new(),
     };
-    format!("{}\n\n{table}\n\n{verdict}{skipped}", path.display())
+    let absent = match outcome.compared_nothing() {
+        true => String::new(),
+        false => absent(&outcome.not_in_bag),
+    };
+    format!(
+        "{}\n\n{table}\n\n{verdict}{skipped}{absent}",
+        path.display()
+    )
+}
+
+/// The computed topics that the bag lacks, each with the number of its messages; empty: it lacks none.
+fn absent(not_in_bag: &BTreeMap<String, NotInBag>) -> String {
+    if not_in_bag.is_empty() {
+        return String::new();
+    }
+    let topics = not_in_bag.iter().map(|(topic, sum)| {
+        let plural = if sum.messages == 1 { "" } else { "s" };
+        format!("{topic} ({} message{plural})", sum.messages)
+    });
+    let topics: Vec<String> = topics.collect();
+    format!(
+        "\ncomputed, and absent from the bag: {}; where they were recorded, the bag is not whole",
+        topics.join(", ")
+    )
 }
 
 fn listed(not_in_bag: &BTreeMap<String, NotInBag>) -> String {
@@ -277,6 +300,29 @@ mod tests {
         assert!(!not_in_bag.is_equal());
         let words = page(Path::new("bag"), &not_in_bag);
         assert!(words.contains("were computed (/latency)"), "{words}");
+    }
+
+    #[test]
+    fn computed_topics_that_the_bag_lacks_are_named_beside_equal_ones() {
+        let sum = |messages| NotInBag {
+            messages,
+            sha256: String::new(),
+        };
+        let mut outcome = Outcome::default();
+        outcome
+            .compared
+            .entry("/tf".to_owned())
+            .or_default()
+            .messages = 7;
+        let path = Path::new("bag");
+        assert!(!page(path, &outcome).contains("absent"));
+        outcome.not_in_bag = BTreeMap::from([
+            ("/latency".to_owned(), sum(1)),
+            ("/thermal/model".to_owned(), sum(3)),
+        ]);
+        let words = page(path, &outcome);
+        let wanted = "computed, and absent from the bag: /latency (1 message), /thermal/model (3 messages); ";
+        assert!(words.contains(wanted), "{words}");
     }
 
     #[test]

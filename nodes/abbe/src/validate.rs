@@ -13,6 +13,7 @@ use crate::tell::tell;
 mod folder;
 mod programs;
 mod single;
+mod unknown_latency;
 
 /// Arguments of `abbe validate`.
 #[derive(Args)]

@@ -8,6 +8,7 @@ use node_runtime::complaint;
 use super::Findings;
 use super::programs;
 use super::single::{self, File, Kind};
+use super::unknown_latency;
 use crate::launch::{self, LaunchNode};
 use crate::node;
 use crate::scenario::{SCENARIO_FILE, Scenario, check_machines};
@@ -83,6 +84,7 @@ pub fn check(folder: &Path, findings: &mut Findings) -> Result<()> {
         findings.mistake(complaint::in_words(&error));
     }
     programs::check(&launched, findings);
+    unknown_latency::check(&launched, findings);
     if !held_up.is_empty() {
         findings.note(format!(
             "{}: looked at as far as the files above permit: {}; mend these, and validate again",
