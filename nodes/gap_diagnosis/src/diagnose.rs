@@ -157,6 +157,7 @@ fn prepared<R>(
     }
     let of_session = own_noise.then(|| changes_of(session, &rows, &residual, config));
     let changes = of_session.unwrap_or_default();
+    let set_ups = changes::set_ups(session);
     let of_set_up = |session: &Session| -> Result<R, GapError> {
         let noise = if own_noise {
             noise_of(machine, session, stations, &residual, &changes, config)
@@ -178,12 +179,12 @@ fn prepared<R>(
             listed: listed(machine)?,
             begins: changes::begins(session, &changes),
             changes: changes.clone(),
+            set_ups: set_ups.clone(),
             floats: vec![],
             is_of_targets: false,
         };
         let base = base.floating(config);
-        let notes = of_begin(&base, &rows, of);
-        Ok(then(&base, notes))
+        Ok(then(&base, of_begin(&base, &rows, of)))
     };
     let Some(anew) = changes::set_up_anew(session, &changes, config) else {
         return of_set_up(session);
@@ -335,7 +336,8 @@ impl<'a> Base<'a> {
     ) -> (Vec<OverSession>, Vec<DoesNotRepeat>) {
         let over_session = over_session::of_named(fitted, found, rest, config);
         let left = less(&all.raw, &told(all, found.named(), found));
-        let changes = over_session::not_repeated(all, &left, &self.changes, found, config);
+        let changes =
+            over_session::not_repeated(all, &left, (&self.changes, &self.set_ups), found, config);
         (over_session, changes)
     }
 

@@ -38,6 +38,8 @@ pub(crate) struct Base<'a> {
     pub(crate) begins: Vec<Begins>,
     /// What changed between repeats of the session.
     pub(crate) changes: Vec<Change>,
+    /// Zero and set-up of each run as recorded.
+    pub(crate) set_ups: Vec<[u32; 2]>,
     /// Whether all that was read are positions at targets.
     pub(crate) is_of_targets: bool,
     /// What is taken out of logs.

@@ -95,7 +95,7 @@ struct Series {
 
 /// The steps of a session, in their order; `raw` is the residual of each row, mm.
 pub fn find(session: &Session, rows: &Rows, raw: &[f64], config: &GapConfig) -> Vec<Change> {
-    let all = series(session, rows, raw);
+    let all = series(session, rows, raw, &set_ups(session));
     let steps = steps(&all);
     let mut found: Vec<Change> = (0..steps.len())
         .filter_map(|at| change(&all, &steps, at, config))
@@ -104,9 +104,22 @@ pub fn find(session: &Session, rows: &Rows, raw: &[f64], config: &GapConfig) -> 
     found
 }
 
+/// Zero and set-up of each run, as they were recorded: the place of an instrument is the same only under the same.
+pub fn set_ups(session: &Session) -> Vec<[u32; 2]> {
+    let runs = session.runs.iter();
+    runs.map(|run| [run.segment.zero_id, run.segment.setup_id])
+        .collect()
+}
+
 /// What of the changes is in other numbers of the rows, by the largest coefficient in the same channel, mm.
-pub fn left(session: &Session, rows: &Rows, rest: &[f64], changes: &[Change]) -> Vec<f64> {
-    let all = series(session, rows, rest);
+pub fn left(
+    session: &Session,
+    rows: &Rows,
+    rest: &[f64],
+    changes: &[Change],
+    set_ups: &[[u32; 2]],
+) -> Vec<f64> {
+    let all = series(session, rows, rest, set_ups);
     let steps: Vec<usize> = changes.iter().map(|change| change.between[1]).collect();
     let size = |at: usize, change: &Change| {
         let own = all.iter().filter(|own| own.channel == change.channel);
@@ -163,7 +176,7 @@ pub fn begins(session: &Session, changes: &[Change]) -> Vec<Begins> {
 }
 
 /// Coefficients of all patterns of repeated blocks.
-fn series(session: &Session, rows: &Rows, raw: &[f64]) -> Vec<Series> {
+fn series(session: &Session, rows: &Rows, raw: &[f64], set_ups: &[[u32; 2]]) -> Vec<Series> {
     let mut all = BTreeMap::<(Channel, usize, [u32; 2]), Series>::new();
     let groups = repeats::groups(session, rows);
     let repeated = groups.iter().enumerate().filter(|(_, own)| own.len() > 1);
@@ -187,8 +200,8 @@ fn series(session: &Session, rows: &Rows, raw: &[f64]) -> Vec<Series> {
                 let radial = block.channel == Channel::Radial && kind == Mode::Place(1);
                 let is_shared = kind == Mode::Offset || radial;
                 // A place under another zero, or set up anew, is another place.
-                let set_up = [run.segment.zero_id, run.segment.setup_id];
-                let set_up = if is_shared { set_up } else { [0; 2] };
+                let own = set_ups.get(block.run).filter(|_| is_shared);
+                let set_up = own.copied().unwrap_or_default();
                 let key = (block.channel.clone(), pattern, set_up);
                 let own = all.entry(key).or_insert_with(|| Series {
                     channel: block.channel.clone(),

@@ -200,11 +200,11 @@ fn judged(session: &Session, sizes: &[Sized], config: &GapConfig) -> OverSession
 pub(crate) fn not_repeated(
     stack: &Stack<'_>,
     rest: &[f64],
-    all: &[Change],
+    (all, set_ups): (&[Change], &[[u32; 2]]),
     found: &Found,
     config: &GapConfig,
 ) -> Vec<DoesNotRepeat> {
-    let sizes_mm = changes::left(stack.session, &stack.rows, rest, all);
+    let sizes_mm = changes::left(stack.session, &stack.rows, rest, all, set_ups);
     let number = |run: usize| stack.session.runs[run].segment.run;
     // A shift of a reference point is what a set-up that moved makes as well; no other effect is.
     let is_shift = |member: &Member| found.instance(member).kind.id == changes::MOVES_ONCE;
@@ -231,7 +231,7 @@ pub(crate) fn not_repeated(
         .collect();
     // What a step leaves beside an effect that explains it pulls a slope with it.
     if all.is_empty() {
-        let evenly = evenly::find(stack.session, &stack.rows, rest, config);
+        let evenly = evenly::find(stack.session, &stack.rows, rest, set_ups, config);
         told.extend(evenly.iter().map(|change| of(change, change.size_mm, true)));
     }
     told

@@ -26,8 +26,14 @@ use crate::search::rows::{Rows, count};
 const LEAST_RUNS_OF_SLOPE: usize = 6;
 
 /// The largest even change of each channel that `rest`, in mm, shows; between its first and its last run.
-pub fn find(session: &Session, rows: &Rows, rest: &[f64], config: &GapConfig) -> Vec<Change> {
-    of(&series(session, rows, rest), config)
+pub fn find(
+    session: &Session,
+    rows: &Rows,
+    rest: &[f64],
+    set_ups: &[[u32; 2]],
+    config: &GapConfig,
+) -> Vec<Change> {
+    of(&series(session, rows, rest, set_ups), config)
 }
 
 fn of(all: &[Series], config: &GapConfig) -> Vec<Change> {

@@ -135,6 +135,54 @@ fn a_plate_that_is_mounted_anew_has_not_slipped() {
     assert!(slips.is_empty(), "{slips:?}");
 }
 
+/// A plate's clamp grows by 2 um/K in a shop that warms by 4 K and cools again; no thermometer was read.
+#[test]
+fn a_plate_that_wanders_with_the_shop_is_not_passed_over() {
+    let wandered =
+        [0.0, 1.5, 4.2, 7.6, 8.0, 5.1, 2.4].map(|um: f64| move |_: &State| [1e-3 * um, 0.0]);
+    for seed in 40..42 {
+        let all: Vec<&Wrong> = wandered.iter().map(|one| one as &Wrong).collect();
+        let diagnosis = diagnosed(&cycles(seed, &all));
+        let report = &diagnosis.report;
+        assert!(
+            changed(&diagnosis) || report.unknown.flagged || !names(&diagnosis).is_empty(),
+            "{}",
+            told(&diagnosis)
+        );
+        // A play, a squareness or a scale makes nothing like it.
+        let wrong = ["backlash", "squareness", "scale_error", "servo_lag"];
+        let is_wrong = |name: &String| wrong.iter().any(|one| name.starts_with(one));
+        assert!(
+            !names(&diagnosis).iter().any(is_wrong),
+            "{}",
+            told(&diagnosis)
+        );
+    }
+}
+
+#[test]
+fn a_file_that_is_written_has_what_is_named_and_nothing_else() {
+    let play = soft_play(0, 6e-3);
+    let both = move |s: &State| {
+        let [u, v] = play(s);
+        let [x, y] = s.position;
+        // Beside the play a shape of no class, of which something may look like a cause.
+        let odd = 2e-3 * s.velocity[1].signum() * (x / 50.0).powi(2) * (y / 50.0);
+        [u + odd, v]
+    };
+    for seed in 50..53 {
+        let diagnosis = diagnosed(&cycles(seed, &[&both, &both]));
+        let causes = diagnosis.report.causes.iter();
+        let named = causes.filter(|cause| cause.status == Status::Named);
+        let named: Vec<String> = named.map(|c| format!("{} {}", c.effect, c.axis)).collect();
+        let written = diagnosis.effects.iter();
+        let written: Vec<String> = written
+            .map(|entry| format!("{} {}", entry.kind, entry.axis.clone().unwrap_or_default()))
+            .collect();
+        assert_eq!(written, named, "{}", told(&diagnosis));
+    }
+}
+
 #[test]
 fn what_holds_is_said_to_and_of_nothing_nothing_is_named() {
     let play = soft_play(0, 4e-3);
