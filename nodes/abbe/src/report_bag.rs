@@ -32,6 +32,7 @@ use crate::pdf;
 use crate::tell::tell;
 
 mod first_screen;
+pub mod foreign_log;
 pub mod from_table;
 
 /// Arguments of `abbe report`.

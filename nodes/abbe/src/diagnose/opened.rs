@@ -6,6 +6,7 @@ use anyhow::{Result, bail};
 use reports::gap::diagnosed::Diagnosed;
 
 use crate::import::Named;
+use crate::report_bag::foreign_log;
 use crate::report_bag::from_table::{self, FromTable};
 
 /// Bags as they are read, and the tables that some were made of.
@@ -28,13 +29,17 @@ impl Opened {
     ) -> Result<Self> {
         let (mut bags, mut tables) = (vec![], vec![]);
         for path in paths {
-            if !from_table::is_table(path) {
+            let log = match from_table::is_table(path) {
+                true => None,
+                false => foreign_log::of(path)?,
+            };
+            if !from_table::is_table(path) && log.is_none() {
                 bags.push(path.clone());
                 continue;
             }
             let Some((name, text)) = machine else {
                 bail!(
-                    "{}: a table has no machine file: name it with --machine",
+                    "{}: a table has no machine file: write one (abbe new-machine FILE) and name it with --machine",
                     path.display()
                 );
             };
@@ -42,7 +47,10 @@ impl Opened {
                 place: name.to_owned(),
                 text: text.to_owned(),
             };
-            let table = from_table::of_machine(path, map, machine)?;
+            let table = match log {
+                Some(log) => from_table::of_log(path, &log, map, Some(machine))?,
+                None => from_table::of_machine(path, map, machine)?,
+            };
             bags.push(table.bag.clone());
             tables.push(table);
         }

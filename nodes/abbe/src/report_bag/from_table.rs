@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
 use metrology::yaml;
-use reports::whole_file::Vanishing;
+use reports::whole_file::{self, Vanishing};
 
 use crate::import::map::Map;
 use crate::import::{self, Named, propose};
+use crate::report_bag::foreign_log::{self, Log};
 
 /// Ends of names of files that are tables.
 const ENDS: [&str; 6] = ["csv", "tsv", "txt", "dat", "xlsx", "xlsm"];
@@ -58,6 +59,9 @@ pub fn is_table(path: &Path) -> bool {
 /// When a map is named for a bag, when table or map cannot be read, or nothing is recognised.
 pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
     if !is_table(path) {
+        if let Some(log) = foreign_log::of(path)? {
+            return of_log(path, &log, map, None).map(Some);
+        }
         if map.is_some() {
             bail!(
                 "--map does nothing: {} is no table, which ends with one of {}, and no file of an instrument",
@@ -68,11 +72,44 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
         return Ok(None);
     }
     let (described, read) = described(path, map)?;
-    let machine = Named {
+    imported(path, described, stand_in(&read)).map(Some)
+}
+
+/// The machine of a table that states none.
+fn stand_in(read: &Map) -> Named {
+    Named {
         place: "the machine that is taken where none is stated".to_owned(),
-        text: propose::machine_for(&read),
-    };
-    imported(path, described, machine).map(Some)
+        text: propose::machine_for(read),
+    }
+}
+
+/// Imports what another program's bag holds as a log, for a machine file where there is one.
+///
+/// # Errors
+/// As [`of`].
+pub fn of_log(
+    path: &Path,
+    log: &Log,
+    map: Option<&Path>,
+    machine: Option<Named>,
+) -> Result<FromTable> {
+    let home = Vanishing::temporary().context("a folder for the table of the bag")?;
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    let table = home.path().join(format!("{}.csv", name.to_string_lossy()));
+    whole_file::write(&table, &log.table)?;
+    // The table goes away: what is said of it is said of the bag.
+    let (own, of_bag) = (table.display().to_string(), path.display().to_string());
+    let told = |text: String| text.replace(&own, &of_bag);
+    let made = described(&table, map).and_then(|(described, read)| {
+        let machine = machine.unwrap_or_else(|| stand_in(&read));
+        imported(&table, described, machine)
+    });
+    let mut made = made.map_err(|error| anyhow!("{}", told(format!("{error:#}"))))?;
+    let lines = std::mem::take(&mut made.lines).into_iter().map(told);
+    made.lines = lines.chain(log.lines.iter().cloned()).collect();
+    made.lines.sort_by_key(|line| !line.starts_with(WARNING));
+    made.n_odd += log.n_lost;
+    Ok(made)
 }
 
 /// The same for a machine file.
