@@ -103,12 +103,23 @@ fn answer(title: &str, diagnosed: &Diagnosed) -> Option<String> {
     let figures = &diagnosed.diagnosis.figures;
     Some(match title {
         CAUSES => {
-            let is_open = |cause: &&Cause| cause.status == Status::Surrogate;
-            let n_open = report.causes.iter().filter(is_open).count();
-            let n_named = report.causes.len() - n_open;
-            match n_open {
-                0 => format!("{n_named} named."),
-                n => format!("{n_named} named; {n} fail a check."),
+            let n = |status| {
+                report
+                    .causes
+                    .iter()
+                    .filter(|own| own.status == status)
+                    .count()
+            };
+            let all = [
+                (n(Status::Named), "named"),
+                (n(Status::Set), "one of a set"),
+                (n(Status::Surrogate), "looking like one"),
+            ];
+            let there = all.iter().filter(|(n, _)| *n > 0);
+            let there: Vec<String> = there.map(|(n, what)| format!("{n} {what}")).collect();
+            match there[..] {
+                [] => "None named.".to_owned(),
+                _ => format!("{}.", there.join(", ")),
             }
         }
         HELD_OUT => {

@@ -93,15 +93,19 @@ fn verdict(report: &GapReport) -> (String, Tone) {
     };
     let title = format!("{}{}", sized(cause), since(report, cause));
     let others = report.causes.iter();
-    let n = others.filter(|c| c.status != Status::Surrogate).count();
-    let (rest, closes) = match n {
-        0 | 1 => (String::new(), "closes"),
-        2 => (" and 1 more cause".to_owned(), "close"),
-        n => (format!(" and {} more causes", n - 1), "close"),
+    let others: Vec<&Cause> = others
+        .filter(|other| other.status != Status::Surrogate && !std::ptr::eq(*other, cause))
+        .collect();
+    let (rest, closes) = match others[..] {
+        [] => (String::new(), "closes"),
+        [other] => (format!(" and {}", sized(other)), "close"),
+        _ => (format!(" and {} more causes", others.len()), "close"),
     };
     let Some(share) = share else {
+        let is_sure = cause.status == Status::Named;
+        let doubt = if is_sure { "" } else { ", or what looks alike" };
         let line = format!(
-            "Machine and simulator differ by {} µm rms; {title}{rest} is named as the cause.",
+            "Machine and simulator differ by {} µm rms; the cause is {title}{rest}{doubt}.",
             three(gap.rms_um)
         );
         return (line, Tone::Plain);
@@ -267,7 +271,7 @@ mod tests {
         let screen = of(&report, &[]);
         let (verdict, tone) = screen.verdict.unwrap();
         assert!(
-            verdict.contains("Squareness XY (EC0Y) 40.0 ± 2.0 µrad and 1 more cause close 93 %"),
+            verdict.contains("Squareness XY (EC0Y) 40.0 ± 2.0 µrad and backlash X"),
             "{verdict}"
         );
         assert_eq!(tone, Tone::Good);
