@@ -151,38 +151,53 @@ fn of_line((n, line): (u64, &str), is_comment: bool) -> Result<Option<Axis>> {
     let all = words(line);
     let key = line.split([':', '=']).next().unwrap_or_default();
     let is_key = |word: &String| AXIS_KEYS.contains(&word.as_str());
-    let (own, rest): (Vec<String>, Vec<String>) = match words(key) {
-        keys if keys.len() < all.len() && keys.iter().all(is_key) && !keys.is_empty() => {
-            (keys.clone(), all.iter().skip(keys.len()).cloned().collect())
-        }
-        _ if all.first().is_some_and(is_key) && all.len() == 2 => {
-            (vec![], all.iter().skip(1).cloned().collect())
-        }
-        _ => {
-            let is_label = all.len() <= MOST_LABEL_WORDS || is_comment;
-            let is_standing = all.iter().any(|word| OF_STANDING.contains(&word.as_str()));
-            let stated = prose::axis(line, is_comment);
-            return Ok(stated.filter(|_| is_label && !is_standing));
-        }
+    let keys = words(key);
+    let is_keyed = !keys.is_empty() && keys.len() < all.len() && keys.iter().all(is_key);
+    let is_pair = all.len() == 2 && all.first().is_some_and(is_key);
+    if !is_keyed && !is_pair {
+        let is_label = all.len() <= MOST_LABEL_WORDS || is_comment;
+        let is_standing = all.iter().any(|word| OF_STANDING.contains(&word.as_str()));
+        let stated = prose::axis(line, is_comment);
+        return Ok(stated.filter(|_| is_label && !is_standing));
+    }
+    // `Axis: X; position Y 200` goes on with something else.
+    let own = words(line.split(';').next().unwrap_or_default());
+    let n_keys = if is_keyed { keys.len() } else { 1 };
+    let rest = own.get(n_keys..).unwrap_or_default();
+    let is_first = |word: &String| is_axis_word(word) || word.parse::<f64>().is_ok();
+    let Some(first) = rest.first().filter(|first| is_first(first)) else {
+        // `Axis: linear X` has its letter behind other words.
+        let letters = rest
+            .iter()
+            .filter(|word| matches!(word.as_str(), "x" | "y" | "z"));
+        let letters: Vec<&String> = letters.collect();
+        return Ok(match letters.as_slice() {
+            [one] => pass_names::axis_of(one),
+            _ => None,
+        });
     };
-    let is_short = |word: &&String| word.chars().count() <= 2 || word.parse::<f64>().is_ok();
-    let letters: Vec<&String> = rest
+    // "a" is a word of prose as well.
+    let mut others = rest
         .iter()
-        .filter(|word| word.as_str() != "1" || own.is_empty())
-        .filter(is_short)
-        .filter(|word| !matches!(word.as_str(), "of" | "no" | "nr"))
-        .collect();
-    match letters.as_slice() {
-        [] => Ok(None),
-        [one] if pass_names::axis_of(one).is_some_and(|_| !is_numbered(one)) => {
-            Ok(pass_names::axis_of(one))
-        }
-        _ if rest.first().is_some_and(|word| !is_short(&word)) => Ok(None),
-        _ => bail!(
+        .skip(1)
+        .filter(|word| is_axis_word(word) && *word != "a");
+    let axis = pass_names::axis_of(first).filter(|_| !is_numbered(first));
+    let is_one = others.all(|other| pass_names::axis_of(other) == axis);
+    if axis.is_none() || !is_one {
+        bail!(
             "line {n}: \"{}\": must name one of X, Y, Z, A, B and C: correct the line, or write a map",
             shown(line)
-        ),
+        );
     }
+    Ok(axis)
+}
+
+/// Whether a word is made of letters of axes, with or without a number: `x`, `y2`, `xy`, `w`.
+fn is_axis_word(word: &str) -> bool {
+    let bare = word.trim_end_matches(|letter: char| letter.is_ascii_digit());
+    let are_letters = bare.chars().all(|letter| "xyzuvw".contains(letter));
+    let is_rotary = matches!(bare, "a" | "b" | "c");
+    (1..=3).contains(&bare.len()) && (are_letters || is_rotary)
 }
 
 /// `Y2`: another axis than the only or the first one of its letter.
@@ -352,6 +367,12 @@ mod tests {
             ("Axis: Y1", Some(Axis::Y)),
             ("Positioning X axis", Some(Axis::X)),
             ("Axis: linear", None),
+            ("Axis: X; position Y 200", Some(Axis::X)),
+            ("Axis: X, 600 mm", Some(Axis::X)),
+            ("Axis: X-axis", Some(Axis::X)),
+            ("Achse: X-Achse, a new screw", Some(Axis::X)),
+            ("Axis: linear X", Some(Axis::X)),
+            ("Axis of rotation", None),
             ("Operator: Y. Sato", None),
             ("Y axis parked", None),
             ("Y axis of the laser head", None),

@@ -326,7 +326,6 @@ fn is_times(word: &str) -> bool {
 /// Begins of words of quantities that no displacement and no radial deviation is, and of what was done to its numbers.
 const NO_READING_BEGINS: &[&str] = &[
     "veloc",
-    "speed",
     "accel",
     "setpoint",
     "command",

@@ -17,6 +17,12 @@ type Lines = [(u64, Vec<String>)];
 /// Words in a cell of a column of directions, beside those that names of columns have too.
 const UP_WORDS: &[&str] = &[
     "u",
+    "+ve",
+    ">",
+    "->",
+    "-->",
+    "f",
+    "fw",
     "upward",
     "upwards",
     "forwards",
@@ -45,6 +51,13 @@ const UP_WORDS: &[&str] = &[
 ];
 const DOWN_WORDS: &[&str] = &[
     "d",
+    "-ve",
+    "<",
+    "<-",
+    "<--",
+    "r",
+    "rv",
+    "b",
     "downward",
     "downwards",
     "back",
@@ -75,6 +88,22 @@ const DOWN_WORDS: &[&str] = &[
     "負方向",
     "负方向",
     "回程",
+];
+/// Words beside one of a direction in a cell.
+const BESIDE: &[&str] = &[
+    "run",
+    "pass",
+    "stroke",
+    "travel",
+    "approach",
+    "direction",
+    "move",
+    "lauf",
+    "richtung",
+    "weg",
+    "fahrt",
+    "way",
+    "cycle",
 ];
 /// Words that are known, as a message lists them.
 pub const KNOWN_WORDS: &str = "up, +, +X, 1, u, forward, hin, aller, ↑ or down, -, -X, -1, d, reverse, back, zurück, retour, ↓";
@@ -127,9 +156,23 @@ pub fn of_cell(cell: &str) -> Option<Direction> {
         let sign = lower.replace(bare, "");
         Direction::of_word(&sign).filter(|_| is_axis)
     };
+    // `Forward run 2`, `hin 1`.
+    let among_others = || {
+        let all = words(&lower);
+        let is_beside = |word: &String| {
+            BESIDE.contains(&word.as_str()) || word.bytes().all(|byte| byte.is_ascii_digit())
+        };
+        let mut own = all.iter().filter(|word| !is_beside(word));
+        let word = own.next()?;
+        let is_alone = own.next().is_none() && word.chars().count() > 1;
+        let is_number = word.parse::<f64>().is_ok();
+        let found = Direction::of_word(word).or_else(|| known(word));
+        found.filter(|_| is_alone && !is_number)
+    };
     Direction::of_word(&lower)
         .or_else(|| known(&lower))
         .or_else(signed)
+        .or_else(among_others)
 }
 
 /// What is wrong with a column of directions that is not understood: one of that name, or one of two words that part passes in

@@ -22,7 +22,8 @@ const OTHER_QUANTITIES: &[&str] = &[
     "rechtwinklig",
     "flatness",
     "ebenheit",
-    "parallel",
+    "parallelism",
+    "parallelität",
     "diagonal",
     "backlash",
     "umkehrspanne",
@@ -31,16 +32,7 @@ const OTHER_QUANTITIES: &[&str] = &[
 ];
 /// Other such words, whole.
 const OTHER_WHOLE: &[&str] = &[
-    "pitch",
-    "yaw",
-    "roll",
-    "nicken",
-    "gieren",
-    "rollen",
-    "velocity",
-    "average",
-    "averages",
-    "simulated",
+    "pitch", "yaw", "roll", "nicken", "gieren", "rollen", "velocity",
 ];
 /// Two words of such a quantity.
 const OTHER_PAIRS: [[&str; 2]; 4] = [
@@ -383,6 +375,8 @@ mod tests {
             "Pitch error compensation: off",
             "Backlash compensation on",
             "Pitch: 10 mm",
+            "Average of 3 readings at each stop",
+            "Parallel kinematic machine",
             "Ball screw pitch 10",
             "Operator: Roll",
             "Mean temperature: 20.1",

@@ -39,6 +39,11 @@ fn words_of_directions_in_four_languages_are_read() {
         ("sens", ["aller", "retour"]),
         ("方向", ["往", "復"]),
         ("direction", ["forth", "back"]),
+        ("direction", ["Forward run", "Reverse run"]),
+        ("direction", ["+ve", "-ve"]),
+        ("direction", ["f", "r"]),
+        ("direction", ["-->", "<--"]),
+        ("direction", ["positive direction", "negative direction"]),
     ] {
         for has_runs in [true, false] {
             let map = proposed(name, words, has_runs).expect(name);
