@@ -90,7 +90,7 @@ const DOWN_WORDS: &[&str] = &[
     "回程",
 ];
 /// Words beside one of a direction in a cell.
-const BESIDE: &[&str] = &[
+const BESIDE_DIRECTIONS: &[&str] = &[
     "run",
     "pass",
     "stroke",
@@ -160,7 +160,8 @@ pub fn of_cell(cell: &str) -> Option<Direction> {
     let among_others = || {
         let all = words(&lower);
         let is_beside = |word: &String| {
-            BESIDE.contains(&word.as_str()) || word.bytes().all(|byte| byte.is_ascii_digit())
+            BESIDE_DIRECTIONS.contains(&word.as_str())
+                || word.bytes().all(|byte| byte.is_ascii_digit())
         };
         let mut own = all.iter().filter(|word| !is_beside(word));
         let word = own.next()?;
