@@ -185,9 +185,10 @@ fn page(path: &Path, outcome: &Outcome) -> String {
         Some(line) => format!("\n{line}: no timer ran through a leap"),
         None => String::new(),
     };
-    let absent = match outcome.compared_nothing() {
-        true => String::new(),
-        false => absent(&outcome.not_in_bag),
+    let absent = if outcome.compared_nothing() {
+        String::new()
+    } else {
+        absent(&outcome.not_in_bag)
     };
     format!(
         "{}\n\n{table}\n\n{verdict}{skipped}{absent}",

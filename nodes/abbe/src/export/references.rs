@@ -214,6 +214,24 @@ mod tests {
     }
 
     #[test]
+    fn of_two_measurements_of_an_axis_the_last_is_taken_and_both_are_named() {
+        let begun = |s: i64| LinearTest {
+            began: Stamp::from_nanos(s * 1_000_000_000),
+            ..laser(Axis::X, Reference::Length, false)
+        };
+        let tests = Tests {
+            linear: vec![begun(1_767_600_000), begun(1_767_700_000)],
+            ..Tests::default()
+        };
+        let mut measured = Measured::default();
+        let told = tables(&tests, &mut measured);
+        let said = told[Axis::X].as_ref().unwrap();
+        let words = "the last of 2 measurements in the bag, begun at 2026-01-06 11:46:40 UTC; not in it: 2026-01-05 08:00:00 UTC";
+        assert!(said.contains(words), "{said}");
+        assert_eq!(measured.tables[Axis::X].as_ref().unwrap().at.nanos(), 0);
+    }
+
+    #[test]
     fn a_laser_gives_the_means_of_both_sides_where_there_is_no_table() {
         let tests = Tests {
             linear: vec![
