@@ -16,7 +16,7 @@ const TEMPERATURE: &str = "sensor_msgs/msg/Temperature";
 /// How long a temperature holds, ns.
 const HOLDS_NS: u64 = 60_000_000_000;
 /// Most rows of a log.
-const MOST_LOG_ROWS: usize = 2_000_000;
+const MOST_DISPLACEMENTS: usize = 2_000_000;
 
 /// How a displacement is held by a type: whether behind a header, and its numbers.
 const DISPLACEMENTS: [(&str, bool, Numbers); 5] = [
@@ -142,9 +142,9 @@ impl<'b> Reading<'b> {
             } else if info.type_name == TEMPERATURE {
                 self.warm(&info.topic, message.data, message.log_time_nanos);
             }
-            if self.rows.len() > MOST_LOG_ROWS {
+            if self.rows.len() > MOST_DISPLACEMENTS {
                 bail!(
-                    "{} has more than {MOST_LOG_ROWS} displacements: record at a lower rate",
+                    "{} has more than {MOST_DISPLACEMENTS} displacements: record at a lower rate",
                     self.moved.topic
                 );
             }
