@@ -249,10 +249,7 @@ pub(crate) fn import(
     notes.extend(cells.note);
     notes.extend(cells.remarks);
     notes.extend(table.left_out);
-    let one_sided = match &map.test {
-        map::Test::Positioning { axis, .. } => lacking::one_sided(&runs.runs, map::units(*axis)),
-        _ => vec![],
-    };
+    let one_sided = one_sided(&map, &runs);
     let n_odd = table.odd.len();
     let n_lost = cells.n_lost_runs + one_sided.len() + cells.sheet.overruns.len();
     notes.extend(spaced::lost(&cells.sheet.overruns));
@@ -267,6 +264,14 @@ pub(crate) fn import(
         n_lost_runs: n_lost,
         notes,
     })
+}
+
+/// Targets of a positioning test that every run reads from one side alone.
+fn one_sided(map: &Map, runs: &Runs) -> Vec<String> {
+    match &map.test {
+        map::Test::Positioning { axis, .. } => lacking::one_sided(&runs.runs, map::units(*axis)),
+        _ => vec![],
+    }
 }
 
 /// Whether a file is of an instrument's own form, by its content; one that cannot be read is of none.

@@ -157,8 +157,7 @@ impl ReportBag {
             &tests,
             table.as_ref().map(|table| table.bag.as_path()),
         );
-        let is_table_whole = table.as_ref().is_none_or(|table| table.is_whole());
-        let is_whole = is_whole(&tests, &report) && is_table_whole;
+        let is_whole = is_whole(&tests, &report) && table.is_none_or(|table| table.is_whole());
         alarms::ended(alarms.as_ref(), kept, loss::exit_code(is_whole))
     }
 

@@ -229,10 +229,7 @@ impl CheckId {
                 "thermometers of its own that the log goes with",
                 Side::AtLeast,
             ),
-            Self::BeatsHeat => (
-                "score lost with a shift by a thermometer in its place",
-                Side::Above,
-            ),
+            Self::BeatsHeat => ("score lost with a thermometer's shift", Side::Above),
             Self::NoiseFloor => (
                 "variance of the session's noise over that of the repeats",
                 Side::AtMost,

@@ -70,8 +70,7 @@ mod tests {
         let map = "start_s: 0\ntest:\n  positioning: {axis: X, feed_mm_min: 1000.0, dwell_s: 2.0, overrun_mm: 1.0, run: n, direction: w, target_mm: t, deviation_um: d}\n";
         let map: Map = serde_saphyr::from_str(map).expect("a map");
         let sheet = Sheet::of_text(text, ',').expect("rows");
-        let table =
-            Table::of(&sheet, &map, &vec![None; 4]).map_err(|error| format!("{error:#}"))?;
+        let table = Table::of(&sheet, &map, &[None; 4]).map_err(|error| format!("{error:#}"))?;
         let rows = table.rows.into_iter().map(|row| row.cells).collect();
         Ok((rows, table.left_out))
     }

@@ -525,7 +525,7 @@ mod tests {
                 let mut rows = measured();
                 let mut left = n;
                 rows.retain(|row| {
-                    let is_kept = row[0] != run || left > 0;
+                    let is_kept = row[0].total_cmp(&run).is_ne() || left > 0;
                     left -= i32::from(row[0].total_cmp(&run).is_eq() && left > 0);
                     is_kept
                 });

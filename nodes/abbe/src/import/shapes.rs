@@ -110,7 +110,7 @@ mod tests {
         let map: Map = serde_saphyr::from_str(&map).expect("a map");
         map.check_columns().expect("columns");
         let sheet = Sheet::of_text(text, ',').expect("rows");
-        let table = Table::of(&sheet, &map, &vec![None; 4]).expect("a table");
+        let table = Table::of(&sheet, &map, &[None; 4]).expect("a table");
         let runs = runs::of(&map.test, &table).expect("runs");
         let cells = |rows: &Vec<Row>| rows.iter().map(|row| row.cells.clone()).collect();
         runs.runs.iter().map(cells).collect()

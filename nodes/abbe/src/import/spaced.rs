@@ -79,7 +79,7 @@ mod tests {
         let map: Map = serde_saphyr::from_str(&map).expect("a map");
         map.check_columns().expect("columns");
         let sheet = Sheet::of_text(text, ' ').expect("rows");
-        Table::of(&sheet, &map, &vec![None; 3]).expect("a table")
+        Table::of(&sheet, &map, &[None; 3]).expect("a table")
     }
 
     #[test]

@@ -387,12 +387,15 @@ mod tests {
     }
 
     fn with_doubles(mut data: Vec<u8>, values: &[f64]) -> Vec<u8> {
-        while (data.len() - 4) % 8 != 0 {
+        while !(data.len() - 4).is_multiple_of(8) {
             data.push(0);
         }
         data.extend(values.iter().flat_map(|value| value.to_le_bytes()));
         data
     }
+
+    /// A displacement's content, by the time in s and its size in m.
+    type Of = fn(f64, f64) -> Vec<u8>;
 
     /// Topic, type and content of a message after so many seconds.
     type Said = (&'static str, &'static str, f64, Vec<u8>);
@@ -427,11 +430,7 @@ mod tests {
     }
 
     /// An hour and a half of a nose that grows by 20 um with 18 min, its bearing by 8 K with 15 min.
-    fn grown(
-        topic: &'static str,
-        type_name: &'static str,
-        of: fn(f64, f64) -> Vec<u8>,
-    ) -> Vec<Said> {
+    fn grown(topic: &'static str, type_name: &'static str, of: Of) -> Vec<Said> {
         let mut all = vec![];
         for k in 0..540_u32 {
             let at_s = 10.0 * f64::from(k);
@@ -452,7 +451,7 @@ mod tests {
         let range = |at_s: f64, z_m: f64| {
             let mut data = header(at_s, "g");
             data.push(0);
-            while (data.len() - 4) % 4 != 0 {
+            while !(data.len() - 4).is_multiple_of(4) {
                 data.push(0);
             }
             data.extend(
@@ -462,7 +461,7 @@ mod tests {
             );
             data
         };
-        let kinds: [(&str, &str, fn(f64, f64) -> Vec<u8>); 4] = [
+        let kinds: [(&str, &str, Of); 4] = [
             ("/displacement", "geometry_msgs/msg/PointStamped", point),
             ("/gauge/z", "std_msgs/msg/Float64", plain),
             ("/gauge/z_um", "std_msgs/msg/Float64", in_um),

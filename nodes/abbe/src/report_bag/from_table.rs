@@ -28,7 +28,7 @@ pub struct FromTable {
     pub lines: Vec<String>,
     /// Cells that cost a row or a reading.
     pub n_odd: usize,
-    /// Runs that the table lacks or that were broken off, and are not in the bag.
+    /// Runs that the table lacks or that were broken off, and messages of another program's bag that were left out.
     n_lost_runs: usize,
 }
 
@@ -108,7 +108,7 @@ pub fn of_log(
     let lines = std::mem::take(&mut made.lines).into_iter().map(told);
     made.lines = lines.chain(log.lines.iter().cloned()).collect();
     made.lines.sort_by_key(|line| !line.starts_with(WARNING));
-    made.n_odd += log.n_lost;
+    made.n_lost_runs += log.n_lost;
     Ok(made)
 }
 

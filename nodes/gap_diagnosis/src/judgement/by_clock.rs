@@ -71,5 +71,5 @@ pub(crate) fn check(
 fn gain(rest: &DVector<f64>, column: &DVector<f64>) -> Option<f64> {
     let square = column.norm_squared();
     let size = rest.dot(column) / square;
-    (size.abs() <= MOST_UM_PER_K).then(|| size * size * square)
+    (size.abs() <= MOST_UM_PER_K).then_some(size * size * square)
 }

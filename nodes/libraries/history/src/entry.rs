@@ -268,6 +268,10 @@ mod tests {
             );
             assert!(refused.contains(words), "{refused}");
         }
+    }
+
+    #[test]
+    fn figures_that_a_machine_has_are_kept() {
         for (name, value, unit) in [
             ("iso230_2.accuracy", 0.0, "mm"),
             ("iso230_2.mean_reversal", -0.005, "mm"),

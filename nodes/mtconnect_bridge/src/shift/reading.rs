@@ -213,17 +213,23 @@ fn refuses(used: &Use, spindle: &str, told: &Told) -> bool {
     is_needed && number.is_none_or(|number| used.refuses(number).is_some())
 }
 
+/// Refuses a mapping without the spindle of the order.
+fn with_spindle(mapping: &Mapping, order: &ShiftOrder) -> Result<(), BridgeError> {
+    let is_spindle = |used: &Use| matches!(used, Use::Number { name, quantity: Quantity::SpindleSpeed, .. } if *name == order.spindle);
+    if mapping.uses().any(|(_, used)| is_spindle(used)) {
+        return Ok(());
+    }
+    Err(BridgeError::NoSpindle {
+        name: order.spindle.clone(),
+    })
+}
+
 /// Cuts an adapter's log into bins; what of it could not be read is in the account.
 ///
 /// # Errors
 /// When the mapping has no such spindle, or nothing of the log lies within the order.
 pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, BridgeError> {
-    let is_spindle = |used: &Use| matches!(used, Use::Number { name, quantity: Quantity::SpindleSpeed, .. } if *name == order.spindle);
-    if !mapping.uses().any(|(_, used)| is_spindle(used)) {
-        return Err(BridgeError::NoSpindle {
-            name: order.spindle.clone(),
-        });
-    }
+    with_spindle(mapping, order)?;
     let log = text::decode(log);
     let mut reader = Reader {
         order,
@@ -264,7 +270,6 @@ pub fn bins(log: &[u8], mapping: &Mapping, order: &ShiftOrder) -> Result<Shift, 
     // What is shorter than one line of a program cannot be seen in it.
     without_spindle.retain(|span| length_s(&[*span]) >= order.bin_s);
     let covered_s = length_s(&covered);
-    // What is shorter than one line of a program cannot be seen in it.
     let is_covered = (order.to - order.from).as_secs_f64() - covered_s < order.bin_s;
     let account = reader.account;
     let bin = Span::from_secs_f64(order.bin_s);
