@@ -67,7 +67,7 @@ pub enum CheckId {
     WithinStations,
     /// The log goes with a thermometer that drives it.
     OwnThermometer,
-    /// No shift with a temperature explains as much as a drift in time.
+    /// No shift with a temperature explains more than a drift in time.
     BeatsHeat,
     /// The noise of the session is that of its repeats.
     NoiseFloor,
@@ -229,7 +229,7 @@ impl CheckId {
                 "thermometers of its own that the log goes with",
                 Side::AtLeast,
             ),
-            Self::BeatsHeat => ("score lost with a thermometer's shift", Side::Above),
+            Self::BeatsHeat => ("score lost with a thermometer's shift", Side::AtLeast),
             Self::NoiseFloor => (
                 "variance of the session's noise over that of the repeats",
                 Side::AtMost,

@@ -5,7 +5,7 @@
 //! members refitted beside it:
 //!
 //! ```text
-//!   gain(drift) - max gain(shift) > 2 ln 20,   |shift| <= 50 um/K          (1)
+//!   gain(drift) - max gain(shift) >= 0,   |shift| <= 50 um/K               (1)
 //! ```
 //!
 //! Where (1) does not hold the drift is shown with that reason: it is not named, and what warms is not known either.
@@ -25,8 +25,6 @@ const BY_CLOCK: &str = "ambient_drift";
 const LAGS_MIN: [f64; 5] = [0.05, 8.0, 25.0, 80.0, 240.0];
 /// The largest shift of a tip that a machine has, µm/K.
 const MOST_UM_PER_K: f64 = 50.0;
-/// Odds from which the drift is preferred.
-const ODDS: f64 = 20.0;
 
 /// (1) of the member at `place`; `others` are the derivatives of the other members. None where nothing is asked.
 pub(crate) fn check(
@@ -63,8 +61,8 @@ pub(crate) fn check(
     });
     let gains = shifts.filter_map(|effect| gain(&rest, &beside(&stack.signature(&*effect))));
     let best_gain = gains.fold(0.0, f64::max);
-    let (lost, limit) = (own - best_gain, 2.0 * ODDS.ln());
-    Some(Check::new(CheckId::BeatsHeat, lost > limit).with(lost, limit))
+    let lost = own - best_gain;
+    Some(Check::new(CheckId::BeatsHeat, lost >= 0.0).with(lost, 0.0))
 }
 
 /// What a shift of so much for 1 µm/K explains, where its size is one that a machine has.

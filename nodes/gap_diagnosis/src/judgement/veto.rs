@@ -74,7 +74,7 @@ pub enum Veto {
     SmallBesideLeft,
     /// The log goes with other thermometers.
     OtherThermometer,
-    /// A shift with a temperature explains as much.
+    /// A shift with a temperature explains more.
     Heat,
     /// The noise is not that of the repeats.
     NoiseFloor,
@@ -105,7 +105,7 @@ impl fmt::Display for Veto {
             Self::OtherThermometer => {
                 f.write_str("no thermometer that the log goes with drives it")
             }
-            Self::Heat => f.write_str("a shift with a temperature explains as much"),
+            Self::Heat => f.write_str("a shift with a temperature explains more"),
             Self::NoiseFloor => f.write_str("the noise is not that of the repeats"),
         }
     }
