@@ -22,7 +22,7 @@ pub enum Truth {
     Has(String),
     /// It has nothing that makes it.
     Lacks,
-    /// The effect is none of the machine's body: of clocks, the control, or what a plant file does not state.
+    /// The plant file does not state it: an effect of clocks, or of the control.
     Unstated,
 }
 

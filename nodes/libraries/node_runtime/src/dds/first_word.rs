@@ -1,11 +1,10 @@
-//! What a writer of ours says to a reader of Cyclone DDS before its first sample: that there is none yet.
+//! A writer of ours tells a reader of Cyclone DDS that it has no samples yet.
 //!
-//! Such a reader begins where the first heartbeat that it hears says. RustDDS 0.15.1 sends one when it meets the reader,
-//! which may not know our writer by then, and does not answer the reader's questions as long as nothing is written. The
-//! first heartbeat that is heard then comes with the first samples; where more are being written meanwhile it counts them in,
-//! and the reader takes those between for older than itself: they are lost though all is acknowledged. So the heartbeat
-//! of a writer without samples is said some times more, under the count of the library's own first one: whoever has heard
-//! a later one does not listen.
+//! Such a reader starts at the first heartbeat that it gets. RustDDS 0.15.1 sends one when it matches the reader. The reader
+//! may not know our writer by then, and RustDDS does not answer its questions before the first sample. The next heartbeat
+//! comes with the first samples. It counts samples that are written but not sent, and the reader takes these for older ones:
+//! they are lost although all are acknowledged. So we repeat the heartbeat of a writer without samples, with the count of
+//! RustDDS's own first one. A reader that has a later heartbeat ignores it.
 
 use std::collections::BTreeSet;
 use std::net::{SocketAddr, UdpSocket};
@@ -18,7 +17,7 @@ use super::is_cyclone;
 use super::rtps::nothing_written;
 use crate::network::Guid;
 
-/// When it is said, after the time before.
+/// Pauses before each repetition.
 const PAUSES: [Duration; 5] = [
     Duration::from_millis(10),
     Duration::from_millis(20),
@@ -27,7 +26,7 @@ const PAUSES: [Duration; 5] = [
     Duration::from_millis(700),
 ];
 
-/// Our reliable writers, whose new readers are told.
+/// Our reliable writers; their new readers get the heartbeat.
 pub(super) struct FirstWords {
     writers: Arc<Mutex<BTreeSet<Guid>>>,
 }

@@ -69,7 +69,7 @@ fn other_radius(circle: &CircleRecording) -> Option<String> {
     })
 }
 
-/// The first reading of a run far from those beside it, which every figure counts, and how many there are; `None`: there is none.
+/// The first reading of a run that is far from its neighbours, and the number of such readings; all figures use them.
 pub(super) fn far(circle: &CircleRecording) -> Option<String> {
     let deviations_mm = deviations_mm(circle);
     let found: Vec<(usize, f64)> = (0..deviations_mm.len())

@@ -13,7 +13,7 @@ use crate::loss;
 pub struct InPlant {
     /// `yes`, `no`, or `not stated`.
     pub has_it: &'static str,
-    /// Key and value of the part that makes it; empty where there is none.
+    /// Key and value of the part that makes it, or empty.
     pub part: String,
 }
 

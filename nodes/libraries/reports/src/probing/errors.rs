@@ -314,7 +314,7 @@ fn farthest(
     nearest.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// The touch of a shape that is far from the others, in words; `None`: there is none, or so few that none can be named.
+/// The touch of a shape that is far from the others, in words; `None` also with too few touches.
 fn far(
     points: &[Vector3<f64>],
     n_unknowns: usize,
