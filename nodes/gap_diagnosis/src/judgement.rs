@@ -13,6 +13,7 @@ pub(crate) mod confirm;
 pub(crate) mod form_doubt;
 pub(crate) mod guard;
 pub(crate) mod in_common;
+pub(crate) mod one_feed;
 pub(crate) mod plain;
 pub(crate) mod recalibration;
 pub mod rule;
@@ -31,7 +32,7 @@ use crate::report::{Constancy, Status};
 pub enum CheckId {
     /// It has one size under all conditions.
     OneSize,
-    /// No size or shape stands at the end of its physical range.
+    /// No size, and no shape that the recording determines, stands at the end of its physical range; time constants of heat may.
     OffBounds,
     /// Its curve is no straight line where it was read.
     Curved,
@@ -178,7 +179,10 @@ impl CheckId {
     const fn words(self) -> (&'static str, Side) {
         match self {
             Self::OneSize => ("one size under all conditions", Side::Below),
-            Self::OffBounds => ("values at the end of their physical range", Side::AtMost),
+            Self::OffBounds => (
+                "determined values at an end of their range, time constants of heat apart",
+                Side::AtMost,
+            ),
             Self::Curved => ("bend of its curve beside a straight line", Side::AtLeast),
             Self::Begins => (
                 "difference from the same effect begun before the recording",

@@ -9,18 +9,28 @@
 //! ```
 //!
 //! Where (1) does not hold the drift is shown with that reason: it is not named, and what warms is not known either.
+//!
+//! Where no thermometer was read, a growth or a coolant's step is known by its course in time alone, and the drift is listed with it.
 
+use std::collections::BTreeSet;
+
+use metrology::Axis;
 use nalgebra::DVector;
+use twin::Channel;
 use twin::effects::{self, Target};
 
 use crate::judgement::by_thermometer::SHIFT;
-use crate::judgement::cause::{Best, Scope};
-use crate::judgement::{Check, CheckId};
+use crate::judgement::cause::{Best, Member, Scope};
+use crate::judgement::{Check, CheckId, unresolved};
+use crate::noise::stack::Stack;
+use crate::report::Status;
 use crate::search::nuisance::orthonormal;
 use crate::search::signature::Library;
 
 /// The effect that has no other cause than time.
 const BY_CLOCK: &str = "ambient_drift";
+/// What warms or cools the machine, known by a thermometer or by its course in time.
+const HEAT: [&str; 2] = ["spindle_growth", "coolant"];
 /// Lags of a body behind the thermometer, min.
 const LAGS_MIN: [f64; 5] = [0.05, 8.0, 25.0, 80.0, 240.0];
 /// The largest shift of a tip that a machine has, µm/K.
@@ -63,6 +73,32 @@ pub(crate) fn check(
     let best_gain = gains.fold(0.0, f64::max);
     let lost = own - best_gain;
     Some(Check::new(CheckId::BeatsHeat, lost >= 0.0).with(lost, 0.0))
+}
+
+/// Lists the slow drift with what warms the machine, where no thermometer was read and one axis.
+pub(crate) fn list_drift(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) {
+    if !stack.session.history.temperature_degc.is_empty() {
+        return;
+    }
+    let axes: BTreeSet<Axis> = { stack.rows.blocks.iter() }
+        .filter_map(|block| match block.channel {
+            Channel::Length(axis) => Some(axis),
+            _ => None,
+        })
+        .collect();
+    let sole = axes.first().copied().filter(|_| axes.len() == 1);
+    for member in members {
+        let instance = &signatures.instances[signatures.forms[member.form].instance];
+        let is_heat = HEAT.contains(&instance.kind.id);
+        let axis = match instance.target {
+            Target::Axis(axis) => Some(axis),
+            _ => sole,
+        };
+        let Some(axis) = axis.filter(|_| is_heat && member.status() != Status::Surrogate) else {
+            continue;
+        };
+        unresolved::list(member, BY_CLOCK, &axis.to_string(), 1.0);
+    }
 }
 
 /// What a shift of so much for 1 µm/K explains, where its size is one that a machine has.

@@ -14,14 +14,15 @@ use twin::effects::{Kind, Moment, Parameter, Role};
 
 use crate::config::GapConfig;
 use crate::judgement::aside;
+use crate::judgement::by_clock;
 use crate::judgement::by_thermometer;
 use crate::judgement::form_doubt;
 use crate::judgement::plain::plainest;
 use crate::judgement::rule::Rule;
 use crate::judgement::unknown::{self, Leftover};
-use crate::judgement::unresolved;
 use crate::judgement::veto::{self, Veto};
 use crate::judgement::{self, Check, CheckId};
+use crate::judgement::{one_feed, unresolved};
 use crate::noise::Noise;
 use crate::noise::normal::Normal;
 use crate::noise::stack::Stack;
@@ -168,6 +169,8 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let mut members = veto::judged(scope, &signatures, &normal, &best, &forms, is_closed);
     by_thermometer::check(scope, &signatures, &mut members, &thermometers);
     unresolved::list_periodic(stack, &signatures, &mut members);
+    one_feed::list(stack, &signatures, &mut members);
+    by_clock::list_drift(stack, &signatures, &mut members);
     resize(stack, &signatures, &normal, &mut members);
     while leave_out_small(stack, &signatures, &mut members) {
         resize(stack, &signatures, &normal, &mut members);

@@ -122,7 +122,12 @@ pub fn targets(stack: &Stack<'_>, axis: Axis) -> Option<Vec<Vec<usize>>> {
 }
 
 /// The period along an axis, mm; none of what has no period.
-fn period_mm(stack: &Stack<'_>, instance: &Instance, axis: Axis, values: &[f64]) -> Option<f64> {
+pub fn period_mm(
+    stack: &Stack<'_>,
+    instance: &Instance,
+    axis: Axis,
+    values: &[f64],
+) -> Option<f64> {
     let parameters = instance.kind.parameters.iter().zip(values);
     parameters.into_iter().find_map(|(parameter, value)| {
         if matches!(parameter.role, Role::Frequency { .. }) {

@@ -1,0 +1,112 @@
+//! What one feed cannot tell apart, and what only shows where an axis turns round.
+//!
+//! # Model
+//!
+//! A lost motion that depends on the feed has some size at each feed. Where every run that shows a play was driven at one feed v,
+//!
+//! ```text
+//!   max v / min v <= 1.2,   v the speed along the path that nine tenths of its moving ticks do not exceed        (1)
+//! ```
+//!
+//! its law is free, and it reads as the play does, whatever form both have along the axis. So it is listed with the play.
+//!
+//! A lost motion that depends on the feed by exp(-v/v_s), and is nearly gone at the slowest of these feeds,
+//!
+//! ```text
+//!   exp(-min v / v_s) < 0.05                                              (2)
+//! ```
+//!
+//! is read just where the axis turns round, where its model does not hold: it is listed with the spike of a reversal.
+//!
+//! # Holds when
+//! Feeds are steady between the turns. Runs at rest have no feed and are left out.
+
+use metrology::Axis;
+use twin::Motion;
+use twin::effects::Target;
+
+use crate::judgement::cause::Member;
+use crate::judgement::unresolved;
+use crate::noise::stack::Stack;
+use crate::report::Status;
+use crate::search::rows::count;
+use crate::search::signature::{Instance, Library};
+
+const PLAY: &str = "backlash";
+const BY_FEED: &str = "feed_lost_motion";
+const SPIKE: &str = "reversal_spike";
+/// The parameter v_s of (2).
+const SPEED: &str = "speed_mm_s";
+/// Greatest ratio (1) of what is one feed.
+const ONE_FEED: f64 = 1.2;
+/// Share of the moving ticks of a run whose speed does not exceed its feed.
+const SHARE_BELOW: f64 = 0.9;
+/// (2).
+const GONE: f64 = 0.05;
+/// A block that has less than this share of a signature's square does not show it.
+const SHOWN: f64 = 0.01;
+/// Below this speed an axis stands, mm/s.
+const STANDS_MM_S: f64 = 1e-3;
+
+/// Lists what a recording cannot tell from a play, or from a lost motion that depends on the feed, by its feeds.
+pub(crate) fn list(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) {
+    for member in members {
+        let instance = &signatures.instances[signatures.forms[member.form].instance];
+        let Target::Axis(axis) = instance.target else {
+            continue;
+        };
+        let id = instance.kind.id;
+        if member.status() == Status::Surrogate || (id != PLAY && id != BY_FEED) {
+            continue;
+        }
+        let values = &member.estimate.values;
+        let Some([slowest, fastest]) = feeds_mm_s(stack, instance, values) else {
+            continue;
+        };
+        let speed = instance
+            .kind
+            .parameters
+            .iter()
+            .position(|p| p.name == SPEED);
+        let rival = if id == PLAY {
+            (fastest <= ONE_FEED * slowest).then_some(BY_FEED)
+        } else {
+            let speed_mm_s = speed.map(|place| values[place]);
+            let is_gone = |speed_mm_s: f64| (-slowest / speed_mm_s).exp() < GONE;
+            speed_mm_s.is_some_and(is_gone).then_some(SPIKE)
+        };
+        if let Some(rival) = rival {
+            unresolved::list(member, rival, &axis.to_string(), 1.0);
+        }
+    }
+}
+
+/// Slowest and fastest feed of the runs that show an effect; `None` where no run moves.
+fn feeds_mm_s(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> Option<[f64; 2]> {
+    let signature = stack.signature(&*instance.effect(values));
+    let least = SHOWN * signature.norm_squared();
+    let blocks = stack.rows.blocks.iter().filter(|block| {
+        let rows = signature.rows(block.start, block.rows.len());
+        rows.norm_squared() >= least
+    });
+    let feeds = blocks.filter_map(|block| feed_mm_s(&stack.session.runs[block.run].motion));
+    feeds.fold(None, |range, feed| {
+        let [low, high] = range.unwrap_or([feed, feed]);
+        Some([feed.min(low), feed.max(high)])
+    })
+}
+
+/// The feed of a run, (1).
+fn feed_mm_s(motion: &Motion) -> Option<f64> {
+    let speed = |tick: usize| -> f64 {
+        let along = Axis::LINEAR.iter();
+        let along = along.filter_map(|axis| motion.velocity[*axis].get(tick));
+        along.map(|speed| speed.powi(2)).sum::<f64>().sqrt()
+    };
+    let speeds = (0..motion.time_s.len()).map(speed);
+    let mut speeds: Vec<f64> = speeds.filter(|speed| *speed > STANDS_MM_S).collect();
+    speeds.sort_by(f64::total_cmp);
+    let last = speeds.len().checked_sub(1)?;
+    let place = (SHARE_BELOW * count(last)) as usize;
+    speeds.get(place).copied()
+}
