@@ -12,6 +12,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::rewrite::{Change, Copied, rewrite};
+use crate::spoiled::report;
 
 /// A parameter of the thermal model as it stands in the bag, and another value of it.
 const CHANGED: (&str, &str) = ("validity_min: 40.0", "validity_min: 41.0");
@@ -210,6 +211,27 @@ fn replay_notices_a_message_more_and_a_message_less() {
         ..Change::default()
     });
     assert_eq!(check(bag.path()).0, 1);
+}
+
+#[test]
+fn a_topic_that_was_taken_out_whole_is_named_with_both_counts() {
+    let is_latency = |topic: &str| topic == "/latency";
+    for keeps_count in [true, false] {
+        let bag = changed(&Change {
+            without: Some(&is_latency),
+            keeps_count,
+            ..Change::default()
+        });
+        let (code, outcome) = check(bag.path());
+        assert_eq!(code, if keeps_count { 3 } else { 0 }, "{outcome:#}");
+        let reported = report(bag.path());
+        assert_eq!(reported.code == 3, keeps_count, "{}", reported.said);
+        for said in [said(bag.path()), reported.said] {
+            let is_named = said.contains(" messages were recorded, and the files hold ")
+                && said.contains("(/latency 0 of 1)");
+            assert_eq!(is_named, keeps_count, "{said}");
+        }
+    }
 }
 
 #[test]

@@ -53,6 +53,8 @@ pub struct Change<'c> {
     pub without_call: Option<usize>,
     /// Whether the hash beside a changed attachment stays the old one.
     pub keeps_hash: bool,
+    /// Whether the count of the recorder's messages stays the old one.
+    pub keeps_count: bool,
 }
 
 /// The contents of a bag, with the channels that its messages will have.
@@ -85,6 +87,9 @@ pub fn rewrite(from: &Path, to: &Path, change: &Change<'_>) {
     }
     if let Some(nth) = change.without_call {
         contents.remove_call(nth);
+    }
+    if !change.keeps_count {
+        contents.count_anew();
     }
     contents.write(writer);
 }
@@ -163,6 +168,15 @@ impl Contents {
             let mut records = self.metadata.iter_mut();
             let hashes = records.find(|record| record.name == "abbe.attachments");
             hashes.unwrap().metadata.insert(name.to_owned(), hash);
+        }
+    }
+
+    /// States as many messages as there are.
+    fn count_anew(&mut self) {
+        let n = self.messages.len().to_string();
+        let records = self.metadata.iter_mut();
+        for record in records.filter(|record| record.name == "abbe.recording") {
+            record.metadata.insert("messages".to_owned(), n.clone());
         }
     }
 

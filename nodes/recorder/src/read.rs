@@ -9,6 +9,7 @@
 mod bag;
 mod chunk;
 mod description;
+mod fewer;
 mod file_order;
 mod foreign;
 mod framing;
@@ -220,6 +221,18 @@ pub enum LossReason {
     Description {
         /// What is wrong, with key, value and what the files hold.
         what: String,
+    },
+    /// The recorder wrote more messages than the files hold.
+    #[error(
+        "{recorded} messages were recorded, and the files hold {held}{of_topics}: some were taken out or lost: take an undamaged copy of the bag"
+    )]
+    Fewer {
+        /// Messages that the recorder wrote.
+        recorded: u64,
+        /// Messages that are there.
+        held: u64,
+        /// The topics that lack some, in words.
+        of_topics: String,
     },
     /// The machine file is absent, cannot be read, or is not the one that was recorded.
     #[error("{what}; the bag is read without it: take an undamaged copy of the bag")]

@@ -12,6 +12,7 @@ use mcap::records::{Record, op};
 use metrology::text::{self, Comments};
 
 use super::description;
+use super::fewer;
 use super::file_order::FileOrder;
 use super::foreign;
 use super::index::{FileIndex, parse};
@@ -116,7 +117,22 @@ impl Bag {
         bag.description = bag.described_wrongly();
         let attached_wrongly = bag.attached_wrongly();
         bag.description.extend(attached_wrongly);
+        let fewer = bag.fewer_than_recorded();
+        bag.description.extend(fewer);
         Ok(bag)
+    }
+
+    /// Whether every file is whole, so that its messages are counted.
+    fn are_counts_known(&self) -> bool {
+        let is_whole = |file: &BagFile| file.index.end_loss.is_none() && !file.index.index_damaged;
+        self.unread.is_empty() && self.files.iter().all(is_whole)
+    }
+
+    /// What the files lack of the messages that their recorder wrote.
+    fn fewer_than_recorded(&self) -> Option<Loss> {
+        let is_known = self.are_counts_known();
+        let fewer = || fewer::of(&self.path, self.path.is_dir(), &self.files, &self.topics);
+        is_known.then(fewer).flatten()
     }
 
     /// Faults of the description, where there is one.
@@ -125,8 +141,7 @@ impl Bag {
         if !self.path.is_dir() || file.symlink_metadata().is_err() {
             return Vec::new();
         }
-        let is_whole = |file: &BagFile| file.index.end_loss.is_none() && !file.index.index_damaged;
-        let is_known = self.unread.is_empty() && self.files.iter().all(is_whole);
+        let is_known = self.are_counts_known();
         let text = regular::description(&file);
         let faults = description::faults(text.as_deref(), is_known.then_some(&self.topics));
         let loss = |what| Loss {
@@ -160,7 +175,8 @@ impl Bag {
         place.map(|(file, at)| file.loss(at, reason, 0))
     }
 
-    /// What is wrong with the description beside the files and with the machine file; no message is lost by it.
+    /// What is wrong with the description beside the files and with the machine file, and messages that were recorded and are in no
+    /// file.
     #[must_use]
     pub fn description_losses(&self) -> &[Loss] {
         &self.description

@@ -44,6 +44,33 @@ struct TopicName {
     type_name: String,
 }
 
+/// What a recorder wrote of its files into one of them.
+#[derive(Debug)]
+pub(super) struct Counts {
+    /// Files.
+    pub n_files: usize,
+    /// Messages of all topics.
+    pub messages: u64,
+    /// The same by topic.
+    pub topics: BTreeMap<String, u64>,
+}
+
+/// What the text of a file's own description says; `None`: it is no such text.
+pub(super) fn counts(text: &str) -> Option<Counts> {
+    let description: Description = yaml::read(text).ok()?;
+    let mut topics = BTreeMap::new();
+    for listed in description.topics_with_message_count? {
+        *topics.entry(listed.topic_metadata.name).or_default() += listed.message_count;
+    }
+    Some(Counts {
+        n_files: description
+            .relative_file_paths
+            .map_or(0, |names| names.len()),
+        messages: description.message_count?,
+        topics,
+    })
+}
+
 /// What is wrong with a description: `text` is that of the file or why it cannot be read, `topics` what the files hold, `None` where they are
 /// damaged themselves, so that their counts are not known.
 pub(super) fn faults(text: Result<&str, &String>, topics: Option<&[TopicInfo]>) -> Vec<String> {

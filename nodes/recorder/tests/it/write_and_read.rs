@@ -103,6 +103,33 @@ fn splits_are_read_in_order_and_listed_in_the_description() {
 }
 
 #[test]
+fn a_folder_that_lacks_a_file_of_its_recording_says_how_many_messages_and_a_lone_part_does_not() {
+    let home = tempfile::tempdir().unwrap();
+    let config = RecorderConfig {
+        max_file_bytes: 8_192,
+        ..small_chunks(ChunkCompression::None)
+    };
+    let (path, summary) = record(home.path(), 700, config);
+    assert_eq!(Bag::open(&path).unwrap().description_losses(), []);
+    let last = summary.files.last().unwrap();
+    let part = Bag::open(path.join(last)).unwrap();
+    assert!(part.message_count() < 700);
+    assert_eq!(part.description_losses(), []);
+    fs::remove_file(path.join("metadata.yaml")).unwrap();
+    assert_eq!(Bag::open(&path).unwrap().description_losses(), []);
+    fs::remove_file(path.join("run_3.mcap")).unwrap();
+    let bag = Bag::open(&path).unwrap();
+    let [loss] = bag.description_losses() else {
+        panic!("{:?}", bag.description_losses());
+    };
+    let n = bag.message_count();
+    let words = format!("700 messages were recorded, and the files hold {n} (");
+    let said = loss.to_string();
+    assert!(n < 700 && said.contains(&words), "{said}");
+    assert!(!loss.reason.is_beside_messages());
+}
+
+#[test]
 fn files_split_by_time_span_no_more_than_they_may_and_a_chunk() {
     let home = tempfile::tempdir().unwrap();
     let config = RecorderConfig {
