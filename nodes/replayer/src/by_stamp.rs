@@ -9,14 +9,16 @@
 //!   o = max(s - l)        of a topic                                        (1)
 //!   k = s - o             axis states and readings: never later than l      (2)
 //!   k = l                 all others, and topics whose s - l differ by more than T  (3)
-//!   k = s - o(axes)       begins and ends of runs, where they are asked for by stamp  (4)
+//!   k = s - o(axes)       begins and ends of runs, where they are asked for by stamp, and then also
+//!                         readings whose o is at most T from o(axes)           (4)
 //! ```
 //!
 //! A message is handed on when none that is still to come can be before it: when one was recorded later than `k + T`, with (4)
 //! later than `k + T` and the greatest lateness of a begin or end.
 //!
 //! # Holds when
-//! One message of a topic came as fast as those of the others: a topic that was late throughout stays so much behind.
+//! One message of a topic came as fast as those of the others: a topic that was late throughout stays so much behind. By (4) it does
+//! not, but where the clocks of hosts differ (4) moves it: who reads by (4) has to see which of both gives more.
 
 use std::collections::BTreeMap;
 
@@ -29,10 +31,17 @@ use crate::reading::stamp_of;
 use crate::stamps::{TOLERANCE_NANOS, nanos_of};
 use crate::turned::Held;
 
-/// Begins and ends whose stamps are farther from those of the axis states than this by their log times were late, ns.
-const SEGMENT_LATE_NANOS: i64 = 250_000_000;
+/// Begins, ends and readings whose stamps are farther from those of the axis states than this by their log times were late, ns.
+const LATE_NANOS: i64 = 250_000_000;
 /// Most messages that wait: of one instant there may be a whole bag.
 const MOST_HELD: usize = 1_000_000;
+
+/// Topics of instruments.
+pub(crate) const READINGS: [&str; 3] = [
+    topics::LENGTH_POSITION.name,
+    topics::GRID_POSITION.name,
+    topics::ANGLE_POSITION.name,
+];
 
 /// What comes first of one instant: a run begins, the axes are somewhere, then all else as it came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -53,36 +62,55 @@ pub(crate) struct ByStamp {
     segment_nanos: Option<i64>,
     /// o of (4); none: begins and ends are read by log time.
     segments_by_nanos: Option<i64>,
+    /// Topics of readings by (4).
+    by_axes: Vec<usize>,
     /// How much later than k a message may have been recorded, ns.
     wait_nanos: i64,
 }
 
-/// How the stamps of begins and ends lie to those of the axis states.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SegmentClock {
+/// How the stamps of begins, ends and readings lie to those of the axis states.
+#[derive(Clone, Debug)]
+pub(crate) struct AxesClock {
     /// o of (4), ns.
     axes_nanos: i64,
-    /// Least and greatest `s - l - o` of begins and ends, ns.
-    off_nanos: (i64, i64),
+    /// Whether begins and ends are off by more than they may.
+    pub(crate) are_segments_off: bool,
+    /// Topics of readings that are off by more than they may, and by T at most.
+    readings: Vec<usize>,
+    /// The greatest lateness of all of these, ns.
+    late_nanos: i64,
 }
 
-impl SegmentClock {
-    /// Of the topics with these numbers; `None`: they agree, or one of them has no clock.
+impl AxesClock {
+    /// Whether readings are off by more than they may.
+    pub(crate) fn are_readings_off(&self) -> bool {
+        !self.readings.is_empty()
+    }
+
+    /// Of the topics with these numbers; `None`: all agree, or axes or segments have no clock.
     pub(crate) fn of(
         offsets_nanos: &BTreeMap<usize, (i64, i64)>,
         (axes, segments): (usize, usize),
+        readings: &[usize],
     ) -> Option<Self> {
         let (_, axes_nanos) = *offsets_nanos.get(&axes)?;
         let (least, greatest) = *offsets_nanos.get(&segments)?;
-        let off_nanos = (
-            least.saturating_sub(axes_nanos),
-            greatest.saturating_sub(axes_nanos),
-        );
-        let is_off = off_nanos.0.saturating_abs() > SEGMENT_LATE_NANOS
-            || off_nanos.1.saturating_abs() > SEGMENT_LATE_NANOS;
-        is_off.then_some(Self {
+        let off = |nanos: i64| nanos.saturating_sub(axes_nanos);
+        let is_late = |nanos: i64| off(nanos).saturating_abs() > LATE_NANOS;
+        let is_off = |topic: &usize| {
+            let greatest = offsets_nanos.get(topic).map(|(_, greatest)| *greatest);
+            greatest.is_some_and(|it| is_late(it) && off(it).saturating_abs() <= TOLERANCE_NANOS)
+        };
+        let readings: Vec<usize> = readings.iter().copied().filter(is_off).collect();
+        let of_readings = readings.iter().filter_map(|topic| offsets_nanos.get(topic));
+        let leasts = of_readings.map(|(least, _)| *least).chain([least]);
+        let late_nanos = leasts.map(|it| off(it).saturating_neg()).max().unwrap_or(0);
+        let are_segments_off = is_late(least) || is_late(greatest);
+        (are_segments_off || !readings.is_empty()).then_some(Self {
             axes_nanos,
-            off_nanos,
+            are_segments_off,
+            readings,
+            late_nanos: late_nanos.max(0),
         })
     }
 }
@@ -101,15 +129,21 @@ impl ByStamp {
             n_taken: 0,
             segment_nanos: None,
             segments_by_nanos: None,
+            by_axes: Vec::new(),
             wait_nanos: TOLERANCE_NANOS,
         }
     }
 
-    /// With begins and ends by (4).
-    pub(crate) fn with_segments(mut self, clock: SegmentClock) -> Self {
+    /// With begins, ends and readings by (4).
+    pub(crate) fn by_axes(mut self, clock: AxesClock) -> Self {
         self.segments_by_nanos = Some(clock.axes_nanos);
-        let late_nanos = clock.off_nanos.0.saturating_neg().max(0);
-        self.wait_nanos = TOLERANCE_NANOS.saturating_add(late_nanos);
+        for topic in &clock.readings {
+            if let Some(offset) = self.offsets_nanos.get_mut(topic) {
+                *offset = clock.axes_nanos;
+            }
+        }
+        self.by_axes = clock.readings;
+        self.wait_nanos = TOLERANCE_NANOS.saturating_add(clock.late_nanos);
         self
     }
 
@@ -149,18 +183,15 @@ impl ByStamp {
         let made = || {
             let offset = self.offsets_nanos.get(&message.topic.index())?;
             let stamp = stamp_of(entry.description.type_name, message.data).map(nanos_of)?;
-            // The few soonest of (1) come when they came.
             let late = log.saturating_sub(stamp.saturating_sub(*offset));
-            (late <= TOLERANCE_NANOS).then(|| log - late.max(0))
+            // The few soonest of (1) come when they came.
+            let is_by_axes = self.by_axes.contains(&message.topic.index());
+            let away = if is_by_axes { late } else { late.max(0) };
+            (late <= self.wait_nanos).then(|| log.saturating_sub(away))
         };
-        let read = [
-            topics::LENGTH_POSITION.name,
-            topics::GRID_POSITION.name,
-            topics::ANGLE_POSITION.name,
-        ];
         if entry.name == topics::AXES_STATE.name {
             (made().unwrap_or(log), Rank::Axes)
-        } else if read.contains(&entry.name) {
+        } else if READINGS.contains(&entry.name) {
             (made().unwrap_or(log), Rank::Other)
         } else {
             (log, Rank::Other)

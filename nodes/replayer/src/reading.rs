@@ -10,7 +10,7 @@ use abbe_msgs::{FieldParts, Message, Wire, from_cdr, parts_of};
 use recorder::{Bag, Event, Loss, MessageRef, Order};
 
 use crate::account::{Account, Place, Reason, TopicAccount};
-use crate::by_stamp::{ByStamp, SegmentClock};
+use crate::by_stamp::{AxesClock, ByStamp, READINGS};
 use crate::known::{entry_in_any_namespace, unreadable};
 use crate::leap::Leaps;
 use crate::repeats::{self, Repeats};
@@ -29,6 +29,8 @@ pub struct Reading {
     pub leaps: Leaps,
     /// Whether begins and ends of runs were recorded more than 0.25 s before or after the axis states of their stamps.
     pub are_segments_off: bool,
+    /// Whether readings of an instrument were, up to the 2 s that a message may be late.
+    pub are_readings_off: bool,
 }
 
 impl Reading {
@@ -80,14 +82,14 @@ pub fn read(bag: &Bag, order: Order, wanted: &[&str], take: impl FnMut(Taken<'_>
 }
 
 /// The same by log time, where axis states and readings of instruments come in the order in which they were made (`by_stamp`);
-/// begins and ends of runs come by their stamps, or as they were recorded.
+/// begins and ends of runs, and readings that are late throughout, come by their stamps, or as they were recorded.
 pub fn read_by_stamp(
     bag: &Bag,
     wanted: &[&str],
-    are_segments_by_stamp: bool,
+    are_all_by_stamp: bool,
     take: impl FnMut(Taken<'_>),
 ) -> Reading {
-    let join = if are_segments_by_stamp {
+    let join = if are_all_by_stamp {
         Join::AllByStamp
     } else {
         Join::ReadingsByStamp
@@ -124,11 +126,12 @@ fn read_through(
         WrongStamps::default()
     };
     let offsets_nanos = wrong_stamps.offsets_nanos();
-    let clock = segment_clock(&plans, offsets_nanos);
-    reading.are_segments_off = clock.is_some();
+    let clock = axes_clock(&plans, offsets_nanos);
+    reading.are_segments_off = clock.as_ref().is_some_and(|clock| clock.are_segments_off);
+    reading.are_readings_off = clock.as_ref().is_some_and(AxesClock::are_readings_off);
     let by_stamp = match (join, clock) {
         (Join::Arrival, _) => None,
-        (Join::AllByStamp, Some(clock)) => Some(ByStamp::new(offsets_nanos).with_segments(clock)),
+        (Join::AllByStamp, Some(clock)) => Some(ByStamp::new(offsets_nanos).by_axes(clock)),
         _ => Some(ByStamp::new(offsets_nanos)),
     };
     let mut reader = Reader {
@@ -166,18 +169,17 @@ fn read_through(
     reading
 }
 
-/// How the stamps of begins and ends lie to those of the axis states, where both are read and differ.
-fn segment_clock(
-    plans: &[Plan],
-    offsets_nanos: &BTreeMap<usize, (i64, i64)>,
-) -> Option<SegmentClock> {
+/// How the stamps of begins, ends and readings lie to those of the axis states, where they differ.
+fn axes_clock(plans: &[Plan], offsets_nanos: &BTreeMap<usize, (i64, i64)>) -> Option<AxesClock> {
     let number_of = |name: &str| {
         let is_it = |plan: &Plan| matches!(plan, Plan::Read { entry, .. } if entry.name == name);
         plans.iter().position(is_it)
     };
     let axes = number_of(topics::AXES_STATE.name)?;
     let segments = number_of(topics::TEST_SEGMENT.name)?;
-    SegmentClock::of(offsets_nanos, (axes, segments))
+    let readings = READINGS.into_iter().filter_map(number_of);
+    let readings: Vec<usize> = readings.collect();
+    AxesClock::of(offsets_nanos, (axes, segments), &readings)
 }
 
 /// Reads one message after another.

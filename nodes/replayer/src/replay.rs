@@ -438,7 +438,7 @@ impl Replay<'_> {
     }
 
     fn summed_up(mut self) -> Outcome {
-        // No message is lost by a wrong description: it makes no difference doubtful.
+        // No message is lost by a wrong description, and those that were taken out were compared: no difference is doubtful by them.
         let description = self.bag.description_losses().iter().cloned();
         self.outcome.reading.losses.extend(description);
         for (route, sum) in self.listening.sums() {

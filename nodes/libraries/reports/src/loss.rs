@@ -157,8 +157,7 @@ mod tests {
                 }],
             },
             losses: vec![loss],
-            leaps: Leaps::default(),
-            are_segments_off: false,
+            ..Reading::default()
         }
     }
 
