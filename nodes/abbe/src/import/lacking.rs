@@ -117,3 +117,37 @@ pub fn check_targets(runs: &[Vec<Row>], units: Units) -> Result<Vec<String>> {
     }
     Ok(remarks)
 }
+
+#[cfg(test)]
+mod tests {
+    use metrology::Axis;
+
+    use super::super::map::units;
+    use super::*;
+
+    /// Two runs up to 300 mm and back, whose turning point has so many rows.
+    fn turned(n: usize) -> Vec<Vec<Row>> {
+        let run = |run: u32| {
+            let up = [0.0, 100.0, 200.0, 300.0];
+            let down = [300.0, 200.0, 100.0, 0.0];
+            let targets = up.iter().chain(&down[2 - n..]);
+            let row = |(k, target): (usize, &f64)| Row {
+                line: k as u64 + 2,
+                cells: vec![f64::from(run), *target, 0.1],
+            };
+            targets.enumerate().map(row).collect()
+        };
+        vec![run(1), run(2)]
+    }
+
+    #[test]
+    fn a_target_that_every_run_has_from_one_side_alone_is_named() {
+        let said = one_sided(&turned(1), units(Axis::X));
+        let begin = "warning, target 300 mm has no reading down in any run: an evaluation of both directions leaves it out, 2 readings; ";
+        assert!(said.len() == 1 && said[0].starts_with(begin), "{said:?}");
+        assert_eq!(one_sided(&turned(2), units(Axis::X)), Vec::<String>::new());
+        // Of one side alone it is a test of one side.
+        let up: Vec<Vec<Row>> = turned(1).into_iter().map(|run| run[..4].to_vec()).collect();
+        assert_eq!(one_sided(&up, units(Axis::X)), Vec::<String>::new());
+    }
+}

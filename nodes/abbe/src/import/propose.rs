@@ -5,7 +5,6 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use metrology::Axis;
-use metrology::yaml::shown;
 
 use super::map::{Direction, Map, Test, units};
 use super::pass_names;
@@ -14,6 +13,7 @@ use super::separators;
 use super::stated::{in_one_line, quoted};
 use super::titles;
 use super::units::{Kind, Unit};
+use super::unread;
 pub use likely::{doubt, doubt_of_targets};
 use likely::{likely_deviation, likely_target};
 
@@ -57,8 +57,14 @@ pub fn of(path: &Path) -> Result<Proposal> {
         text.recognised.push(format!("sheet: \"{name}\""));
     }
     match kind(&found) {
-        Some(Of::Positioning) => text.positioning(found.axis(&stem, false)?)?,
-        Some(Of::Log) => text.log(found.axis(&stem, true)?)?,
+        Some(Of::Positioning) => {
+            let told = text.axis_told(&stem, false)?;
+            text.positioning(told)?;
+        }
+        Some(Of::Log) => {
+            let told = text.axis_told(&stem, true)?;
+            text.log(told)?;
+        }
         Some(Of::Circle) => text.circle(&stem)?,
         None => bail!("{}", nothing::in_words(&found)),
     };
@@ -108,6 +114,7 @@ struct Text<'t> {
     units: Vec<String>,
     used: Vec<String>,
     start_s: f64,
+    is_axis_of_file: bool,
     recognised: Vec<String>,
     needed: Vec<String>,
     assumed: Vec<String>,
@@ -145,6 +152,7 @@ impl<'t> Text<'t> {
             units: vec![],
             used: vec![],
             start_s: 0.0,
+            is_axis_of_file: false,
             recognised: vec![said],
             needed: vec![],
             assumed: vec![],
@@ -187,14 +195,8 @@ impl<'t> Text<'t> {
 
     /// States the unit of a column that is read in `wanted`; of one without a unit that cannot be right the `likely` one.
     fn unit(&mut self, column: &Known, wanted: Unit, likely: Option<Unit>) -> Result<()> {
-        if let Some([with, without]) = &column.thousands {
-            bail!(
-                "column \"{}\": \"{}\" and \"{}\": every separator has three digits behind it and other numbers have none, as where it marks \
-                 thousands: write the numbers without it; or all with decimals, where it stands before decimals",
-                shown(&column.name),
-                shown(with),
-                shown(without)
-            );
+        if let Some(cells) = &column.thousands {
+            bail!("{}", unread::of_thousands(&column.name, cells));
         }
         if let Some(word) = &column.unknown {
             self.needed.push(format!(
@@ -365,7 +367,7 @@ impl<'t> Text<'t> {
     fn axis(&mut self, told: Option<Axis>, taken: Axis) {
         if told.is_some() {
             let _ = writeln!(self.test, "    axis: {taken}");
-            self.recognised.push(format!("axis {taken}"));
+            self.say_axis(taken);
             if let Some((name, _)) = &self.found.axis_column {
                 self.used.push(name.clone());
             }
@@ -561,9 +563,12 @@ mod across;
 mod cells;
 mod dial;
 mod epochs;
+mod file_axis;
 mod likely;
 mod looked;
 mod nothing;
+#[cfg(test)]
+mod other_quantities;
 mod passes_of;
 mod radial;
 mod sign;

@@ -502,6 +502,26 @@ mod tests {
     }
 
     #[test]
+    fn targets_that_differ_where_the_direction_turns_are_refused_with_the_key_that_joins_them() {
+        let rows: Vec<[f64; 4]> = [(0.0, UP), (400.0, UP), (400.12, DOWN), (0.0, DOWN)]
+            .map(|(mm, way)| [1.0, mm, 0.0, way])
+            .to_vec();
+        let refused = of(&test(true), &table(&rows, 4)).unwrap_err().to_string();
+        assert_eq!(
+            refused,
+            "line 4: run 1: target 400.12 mm after 400 mm, where the direction turns: where they are meant to be one target, state \
+             same_target_um in the map, how far such targets differ"
+        );
+        let mut joined = test(true);
+        if let Test::Positioning { same_target_um, .. } = &mut joined {
+            *same_target_um = Some(200.0);
+        }
+        let runs = of(&joined, &table(&rows, 4)).unwrap();
+        let targets: Vec<f64> = runs.runs[0].iter().map(|row| row.cells[1]).collect();
+        assert!(targets[1].total_cmp(&targets[2]).is_eq(), "{targets:?}");
+    }
+
+    #[test]
     fn a_target_that_a_run_lacks_or_has_twice_is_named() {
         let mut rows = measured();
         rows.remove(7);

@@ -61,6 +61,10 @@ pub(super) fn no_names(path: &Path) -> String {
         Some(by) => format!(
             "its columns seem to be apart by {by}, and no line has a name for each of them: put commas, semicolons or tabs between the cells"
         ),
+        None if text.as_deref().is_some_and(has_one_number_each) => {
+            "each row has one number: add a column of positions (target_mm), times (time_s) or angles (angle_deg) beside that of the readings"
+                .to_owned()
+        }
         None => "write a map (docs/reference/scenario.md#import-map)".to_owned(),
     };
     format!(
@@ -88,6 +92,18 @@ fn foreign(text: &str) -> Option<&'static str> {
         return Some("bars (|)");
     }
     (n_rows(|line| line.split_whitespace().collect()) > 1).then_some("spaces")
+}
+
+/// Whether most lines hold one number, as a list of readings without their positions.
+fn has_one_number_each(text: &str) -> bool {
+    let lines = text.lines().filter(|line| !line.trim().is_empty());
+    let lines: Vec<&str> = lines.take(FIRST_LINES).collect();
+    let is_one = |line: &&str| {
+        let cells = line.split([',', ';', '\t']).map(str::trim);
+        is_number(line.trim()) || cells.filter(|cell| is_number(cell)).count() == 1
+    };
+    let n = lines.iter().filter(|line| is_one(line)).count();
+    n > 1 && 2 * n > lines.len()
 }
 
 fn is_number(cell: &str) -> bool {

@@ -108,7 +108,7 @@ pub fn thousands(cells: &[&str], separator: char) -> Option<[String; 2]> {
 /// A cell by which separators of numbers in a unit of so small a size mark thousands: three digits stand behind each, and none
 /// begins with a zero. Nanometres have no decimals that an instrument reads, and targets in micrometres none of three digits.
 pub fn thousands_of_small(cells: &[&str], separator: char) -> Option<[String; 2]> {
-    let mut first = None;
+    let (mut first, mut plain) = (None, String::new());
     for cell in cells {
         let signs = ['-', '+', '\u{2212}', '\u{2013}', ' '];
         let text = cell.trim_start_matches(signs);
@@ -121,11 +121,28 @@ pub fn thousands_of_small(cells: &[&str], separator: char) -> Option<[String; 2]
                 }
                 first.get_or_insert((*cell).to_owned());
             }
-            None if is_digits(text) => {}
+            None if is_digits(text) => (*cell).clone_into(&mut plain),
             None => return None,
         }
     }
-    first.map(|cell| [cell, "0".to_owned()])
+    first.map(|cell| [cell, plain])
+}
+
+/// Why a column whose separators are those of thousands is not read; the second cell, which has none, may be missing.
+pub fn of_thousands(name: &str, [with, without]: &[String; 2]) -> String {
+    let (and, others) = match without.as_str() {
+        "" => (String::new(), ""),
+        plain => (
+            format!(" and \"{}\"", shown(plain)),
+            " and other numbers have none",
+        ),
+    };
+    format!(
+        "column \"{}\": \"{}\"{and}: every separator has three digits behind it{others}, as where it marks thousands: write the numbers \
+         without it; or all with decimals, where it stands before decimals",
+        shown(name),
+        shown(with),
+    )
 }
 
 /// A sentence for each column that is a quantity by its name and has cells that are no numbers; none without any.

@@ -88,3 +88,42 @@ fn separators_of_thousands_are_not_read_as_decimals() {
         assert!(map.contains("deviation_um: \"deviation_um\""), "{map}");
     }
 }
+
+#[test]
+fn thousands_of_nanometres_and_of_micrometres_are_refused_where_no_other_form_stands_beside_them() {
+    for (head, rows, named) in [
+        (
+            "run;direction;target um;deviation nm",
+            [
+                "1;up;10,000;8,600",
+                "1;up;37,300;10,250",
+                "1;up;81,900;12,470",
+            ],
+            "column \"target um\": \"10,000\": every separator has three digits behind it, as",
+        ),
+        (
+            "run;direction;target_mm;deviation_nm",
+            ["1;up;0;8,600", "1;up;37;10,250", "1;up;81;12,470"],
+            "column \"deviation_nm\": \"8,600\": every separator",
+        ),
+        (
+            "run;direction;target_mm;deviation_nm",
+            ["1;up;0;8.600", "1;up;37;10.250", "1;up;81;470"],
+            "column \"deviation_nm\": \"8.600\" and \"470\": every separator has three digits behind it and other numbers have none",
+        ),
+        (
+            "time s;z nm;spindle degC",
+            ["0;8,600;20", "60;10,250;21", "120;12,470;22"],
+            "column \"z nm\": \"8,600\": every separator",
+        ),
+    ] {
+        let refused = refusal(&format!("{head}\n{}\n", rows.join("\n")));
+        assert!(refused.contains(named), "{refused}");
+    }
+    // Three decimals of um, and a nanometre's with a zero in front.
+    for (unit, cells) in [("um", ["8,600", "10,250"]), ("nm", ["0,600", "10,250"])] {
+        let rows = cells.map(|cell| format!("1;up;{cell};{cell}\n")).concat();
+        let map = refusal(&format!("run;direction;target_mm;deviation_{unit}\n{rows}"));
+        assert!(map.contains("deviation_um: "), "{map}");
+    }
+}

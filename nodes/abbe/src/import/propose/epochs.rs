@@ -130,6 +130,31 @@ mod tests {
         }
     }
 
+    /// The same day by both counts: Python, (datetime(2026, 1, 5, 8) - datetime(1900, 1, 1)).total_seconds() and from 1980-01-06, where
+    /// GPS is 18 s ahead of UTC.
+    #[test]
+    fn seconds_of_ntp_and_of_gps_are_named_with_what_makes_dates_of_them() {
+        let ntp = checked(3_976_588_800.0).unwrap().unwrap();
+        let words = "since 1900, as NTP counts them, and was read as seconds since 1970: subtract 2082844800 or 2208988800 for the date";
+        assert!(ntp.contains(words), "{ntp}");
+        assert!((3_976_588_800.0 - NTP_1970_S - 1_767_600_000.0_f64).abs() < 0.5);
+        let named = |name: &str, first: f64| {
+            let text = format!("{name},z_um\n{first},0.1\n{},0.2\n", first + 60.0);
+            let found = of_text(&text).unwrap().unwrap();
+            check_gps(found.first(Role::Time).unwrap(), first)
+        };
+        let gps = named("gps time s", 1_451_635_218.0).unwrap();
+        assert!(
+            gps.contains("named GPS, which counts from 1980-01-06"),
+            "{gps}"
+        );
+        assert!(gps.contains("add 315964800 less the leap seconds"), "{gps}");
+        assert!((1_451_635_218.0 + GPS_EPOCH_S - 18.0 - 1_767_600_000.0_f64).abs() < 0.5);
+        // A time from zero, and one that is not of GPS.
+        assert_eq!(named("gps time s", 0.0), None);
+        assert_eq!(named("time s", 1_451_635_218.0), None);
+    }
+
     #[test]
     fn counts_from_other_days_are_named_and_those_from_1970_are_taken() {
         // The second: Python, (datetime(2026, 1, 5, 8) - datetime(1, 1, 1)) and - datetime(1601, 1, 1), in 100 ns.

@@ -42,3 +42,51 @@ impl Text<'_> {
         ));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use metrology::yaml;
+
+    use super::super::super::map::Map;
+    use super::super::of;
+    use super::*;
+
+    /// The units of the columns of a table of passes, and what is said of them.
+    fn units(names: [&str; 4]) -> (Vec<Option<Unit>>, String) {
+        let home = tempfile::tempdir().expect("a folder");
+        let path = home.path().join("a.csv");
+        let head = names.join(",");
+        let rows =
+            "0,0.011,0.012,0.013,0.014\n100,0.021,0.022,0.023,0.024\n200,0.031,0.032,0.033,0.034\n";
+        std::fs::write(&path, format!("target_mm,{head}\n{rows}")).expect("a file");
+        let proposal = of(&path).expect("a map");
+        let map: Map = yaml::read_letters(&proposal.map).expect("a map");
+        let units = names.map(|name| map.units.get(name).copied());
+        (units.to_vec(), proposal.needed.join("\n"))
+    }
+
+    #[test]
+    fn the_unit_of_one_pass_is_that_of_those_without() {
+        let (found, said) = units(["run 1 up [mm]", "run 1 down", "run 2 up", "run 2 down"]);
+        assert_eq!(found, [Some(Unit::Mm); 4]);
+        let words = "column \"run 2 down\": no unit in its name, read in mm as the passes whose names have one";
+        assert!(said.contains(words), "{said}");
+        let (found, said) = units(["run 1 up", "run 1 down", "run 2 up", "run 2 down [µm]"]);
+        assert_eq!(found, [None; 4]);
+        assert_eq!(
+            said.matches("read in um as the passes").count(),
+            3,
+            "{said}"
+        );
+        // Two units say nothing of a third pass.
+        let (found, said) = units([
+            "run 1 up [mm]",
+            "run 1 down [um]",
+            "run 2 up",
+            "run 2 down [mm]",
+        ]);
+        assert_eq!(found[0], Some(Unit::Mm));
+        assert_eq!(found[3], Some(Unit::Mm));
+        assert!(!said.contains("as the passes"), "{said}");
+    }
+}
