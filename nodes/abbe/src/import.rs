@@ -66,6 +66,7 @@ mod table;
 mod times;
 mod titles;
 mod units;
+mod unlikely;
 mod unread;
 mod vocabulary;
 mod writer;
@@ -254,6 +255,7 @@ pub(crate) fn import(
     let n_lost = cells.n_lost_runs + one_sided.len() + cells.sheet.overruns.len();
     notes.extend(spaced::lost(&cells.sheet.overruns));
     notes.extend(one_sided);
+    notes.extend(unlikely::warnings(&map.test, &runs.runs));
     let n_rows = runs.runs.iter().map(Vec::len).sum();
     notes.extend(runs.remarks);
     Ok(Imported {

@@ -51,6 +51,11 @@ const OF_A_TEST: &[&str] = &[
 const WHOLE: &[&str] = &["line", "place", "height", "type", "typ", "kind"];
 /// First words of such names.
 const WORDS_OF_A_TEST: &[&str] = &["x", "y", "z", "a", "b", "c", "comp", "day", "tag"];
+/// Words of names of what a log is of, and those that may stand beside them; `machine state` may change.
+const OF_A_LOG: &[&str] = &["machine", "maschine", "serial", "instrument"];
+const BESIDE_OF_A_LOG: &[&str] = &[
+    "number", "no", "nr", "id", "name", "laser", "sensor", "gauge",
+];
 /// Parts of names of temperatures, humidities and pressures, and units of them. One reading for each run parts no tests.
 const AMBIENT: &[&str] = &["temp", "therm", "humid", "feucht", "pressure", "druck"];
 const AMBIENT_UNITS: &[&str] = &["hpa", "kpa", "mbar", "rh", "rf"];
@@ -196,7 +201,7 @@ pub fn check(map: &Map, head: &[String], lines: &Lines, rows: &[Row]) -> Result<
             marked(name, &cells, map.decimal)?;
         } else if is_first(name, NAMES_OF_NOTES) {
             noted(name, &cells)?;
-        } else if !is_log && is_of_a_test(name) {
+        } else if (is_log && is_of_an_instrument(name)) || (!is_log && is_of_a_test(name)) {
             parted(name, &cells, (run.is_some(), map.decimal))?;
         }
     }
@@ -359,6 +364,14 @@ fn parted(name: &str, cells: &[Cell<'_>], (has_runs, decimal): (bool, char)) -> 
     );
 }
 
+/// Whether a column names the machine or the instrument of a log.
+fn is_of_an_instrument(name: &str) -> bool {
+    let words = words(name);
+    let is_own = |word: &String| OF_A_LOG.contains(&word.as_str());
+    let is_beside = |word: &String| BESIDE_OF_A_LOG.contains(&word.as_str());
+    words.iter().any(is_own) && words.iter().all(|word| is_own(word) || is_beside(word))
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::sheet::Sheet;
@@ -398,6 +411,30 @@ mod tests {
         match Table::of(&sheet, &map, &ranges) {
             Ok(_) => String::new(),
             Err(error) => format!("{error:#}"),
+        }
+    }
+
+    #[test]
+    fn a_log_of_two_machines_is_refused_and_states_of_a_machine_may_change() {
+        let refusal = |name: &str| {
+            let map = "start_s: 0\ntest:\n  log: {axis: Z, time_s: t, displacement_um: d}\n";
+            let map: Map = serde_saphyr::from_str(map).expect("a map");
+            let row = |k: u32| format!("{},0.5,{}\n", 60 * k, if k < 10 { "A" } else { "B" });
+            let rows: String = (0..20).map(row).collect();
+            let sheet = Sheet::of_text(&format!("t,d,{name}\n{rows}"), ',').expect("rows");
+            let ranges = vec![None; map.test.columns().len()];
+            let read = Table::of(&sheet, &map, &ranges);
+            read.map_or_else(|error| format!("{error:#}"), |_| String::new())
+        };
+        for name in ["machine", "Maschine Nr.", "Instrument", "laser serial"] {
+            let said = refusal(name);
+            let words = format!(
+                "line 12, column \"{name}\": \"B\", and \"A\" in line 11: the rows are of different tests"
+            );
+            assert!(said.starts_with(&words), "{said}");
+        }
+        for name in ["machine state", "operator", "machine mode"] {
+            assert_eq!(refusal(name), "", "{name}");
         }
     }
 
