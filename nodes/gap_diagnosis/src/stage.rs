@@ -119,6 +119,8 @@ pub enum Output {
     NewEffect {
         /// Id and what it acts on.
         effect: String,
+        /// What these runs cannot tell from it.
+        or: Vec<String>,
         /// Parameters with their values.
         size: String,
         /// Probability.
@@ -338,7 +340,7 @@ impl GapDiagnosisStage {
         let mut named = BTreeSet::new();
         let least_confidence = self.config.least_confidence;
         let is_sure = |cause: &&Cause| {
-            cause.status == Status::Named
+            cause.status != Status::Surrogate
                 && cause.confidence >= least_confidence
                 && cause.d >= MIN_D_OF_CHANGE
                 && (is_known || cause.parameters.iter().all(|p| p.name != INSTANT))
@@ -350,6 +352,7 @@ impl GapDiagnosisStage {
             if self.is_news(&effect, cause) {
                 out.push(Output::NewEffect {
                     effect: effect.clone(),
+                    or: rivals(cause),
                     size: size(cause),
                     confidence: cause.confidence,
                 });
@@ -387,6 +390,20 @@ impl GapDiagnosisStage {
             });
         }
     }
+}
+
+/// What these runs cannot tell from a cause.
+fn rivals(cause: &Cause) -> Vec<String> {
+    if cause.status != Status::Set {
+        return vec![];
+    }
+    let open = { cause.confusable_with.iter() }.filter(|other| !other.excluded);
+    open.map(|other| {
+        format!("{} {}", other.effect, other.axis)
+            .trim_end()
+            .to_owned()
+    })
+    .collect()
 }
 
 fn size(cause: &Cause) -> String {

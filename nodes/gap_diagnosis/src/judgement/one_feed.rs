@@ -18,29 +18,42 @@
 //!
 //! is read just where the axis turns round, where its model does not hold: it is listed with the spike of a reversal.
 //!
+//! A wind-up grows with the distance from the bearing. With f its signature and U unit columns that span the play, with its corner and
+//! its forms along the axis,
+//!
+//! ```text
+//!   |U'f| / |f| >= 0.95                                                   (3)
+//! ```
+//!
+//! it reads as a play that wears along the axis, with which it is listed.
+//!
 //! # Holds when
 //! Feeds are steady between the turns. Runs at rest have no feed and are left out.
 
 use metrology::Axis;
 use twin::Motion;
-use twin::effects::Target;
+use twin::effects::{self, Parameter, Role, Target};
 
 use crate::judgement::cause::Member;
 use crate::judgement::unresolved;
 use crate::noise::stack::Stack;
 use crate::report::Status;
+use crate::search::nuisance::orthonormal;
 use crate::search::rows::count;
 use crate::search::signature::{Instance, Library};
 
 const PLAY: &str = "backlash";
 const BY_FEED: &str = "feed_lost_motion";
 const SPIKE: &str = "reversal_spike";
+const WIND_UP: &str = "friction_windup";
 /// The parameter v_s of (2).
 const SPEED: &str = "speed_mm_s";
 /// Greatest ratio (1) of what is one feed.
 const ONE_FEED: f64 = 1.2;
 /// Share of the moving ticks of a run whose speed does not exceed its feed.
 const SHARE_BELOW: f64 = 0.9;
+/// (3).
+const MIN_COSINE_OF_PLAY: f64 = 0.95;
 /// (2).
 const GONE: f64 = 0.05;
 /// A block that has less than this share of a signature's square does not show it.

@@ -18,10 +18,11 @@
 //! A periodic error that was found is listed with the curve, where it has too few targets:
 //!
 //! ```text
-//!   n < 2.5 L/p + 4,   L the length that n targets span, p the period        (2)
+//!   n < 2.5 L/p + 4  or  L < 4 p,   L the length that n targets span, p the period        (2)
 //! ```
 //!
-//! A wave has two parameters a period: with hardly more targets a curve goes through them as well.
+//! A wave has two parameters a period: with hardly more targets a curve goes through them as well. Of three periods a curve of slower
+//! waves follows more than half.
 //!
 //! # Holds when
 //! The period is the lead. A curve with other waves in it is no periodic error of the screw, whatever the targets resolve.
@@ -56,6 +57,8 @@ const SMOOTH_DEGREE: i32 = 3;
 /// Targets of a period, and those of what else is fitted, below which a curve goes through them as well.
 const TARGETS_A_PERIOD: f64 = 2.5;
 const TARGETS_MORE: f64 = 4.0;
+/// Periods of which a curve of slower waves follows half.
+const PERIODS: f64 = 4.0;
 
 /// Lists the periodic error of an axis with a curve that may be one, and the curve with a periodic error of few targets.
 pub(crate) fn list_periodic(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) {
@@ -145,8 +148,10 @@ fn has_few_targets(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> bo
     else {
         return false;
     };
-    let needed = TARGETS_A_PERIOD * (high - low) / period_mm + TARGETS_MORE;
-    resolved::is_at_targets(stack, axis) && count(targets.len()) < needed
+    let periods = (high - low) / period_mm;
+    let is_short = periods < PERIODS;
+    let needed = TARGETS_A_PERIOD * periods + TARGETS_MORE;
+    resolved::is_at_targets(stack, axis) && (is_short || count(targets.len()) < needed)
 }
 
 /// Sine and cosine of the lead and of its shares to this one over the places, whitened.
