@@ -27,9 +27,26 @@ pub struct Coefficient<'a> {
     pub place: usize,
 }
 
-/// One part for a model.
+/// What a value and a mark are.
+const AT_THE_END: &str = "A coefficient times the greatest recorded distance from its origin to its power: µm for shifts, µrad for turns; ~: U exceeds it. ";
+/// What U holds where all recordings of a bag were fitted.
+const U_OF_ALL: &str = "U: expanded uncertainty as the residuals show it, those that follow each other counted as fewer, with what errors of the plate and heat between recordings leave open. How long and how square the plate is as a whole no recording can tell: that is in U where grid_encoder was given the plate's certificate (plate_scale_um_per_m, plate_squareness_urad).";
+/// What U holds where one circle was fitted.
+const U_OF_ONE_CIRCLE: &str = "U: expanded uncertainty as the residuals of this circle alone show it, those that follow each other counted as fewer. The plate's errors and its certificate, heat, and a lost motion that is no step are not in it.";
+
+/// One part for a model of all recordings.
 #[must_use]
 pub fn section(title: &str, model: &GeometryModel) -> Section {
+    described(title, model, U_OF_ALL)
+}
+
+/// One part for what one circle determines.
+#[must_use]
+pub fn section_of_one_circle(title: &str, model: &GeometryModel) -> Section {
+    described(title, model, U_OF_ONE_CIRCLE)
+}
+
+fn described(title: &str, model: &GeometryModel, of_u: &str) -> Section {
     let all = coefficients(model);
     let known: Vec<&Coefficient> = all.iter().filter(|c| c.is_known()).collect();
     let mut section = Section::new(title);
@@ -46,9 +63,14 @@ pub fn section(title: &str, model: &GeometryModel) -> Section {
         .lines
         .extend(signs(model.curves.iter().map(|curve| curve.component)));
     section.tables.push(Rows {
-        head: head(&["coefficient", "at the end of the span", "± U (k = 2)", "span"]),
+        head: head(&[
+            "coefficient",
+            "at the end of the span",
+            "± U (k = 2)",
+            "span",
+        ]),
         rows: known.iter().map(|coefficient| coefficient.row()).collect(),
-        note: "A coefficient times the greatest recorded distance from its origin to its power: µm for shifts, µrad for turns; ~: U exceeds it. U: expanded uncertainty as the residuals show it, those that follow each other counted as fewer, with what errors of the plate and heat between recordings leave open. How long and how square the plate is as a whole no recording can tell: that is in U where grid_encoder was given the plate's certificate (plate_scale_um_per_m, plate_squareness_urad).".to_owned(),
+        note: format!("{AT_THE_END}{of_u}"),
     });
     let (short, long): (Vec<_>, Vec<_>) = model
         .combinations
@@ -92,7 +114,7 @@ fn largest(known: &[&Coefficient]) -> Option<(String, String)> {
     let component = largest.curve.component;
     Some((
         format!("{component} {value} ± {u} {}", unit(component)),
-        format!("{}; k = 2", largest.in_words()),
+        format!("{}{}; k = 2", largest.in_words(), largest.lacks()),
     ))
 }
 
@@ -372,6 +394,16 @@ impl Coefficient<'_> {
         values.get(self.place).copied().unwrap_or(f64::NAN) * factor
     }
 
+    /// That it is no size of its error, where other parts of that are not known.
+    fn lacks(&self) -> &'static str {
+        let places = places(self.curve);
+        let mut others = places.map(|place| Coefficient { place, ..*self });
+        if others.all(|other| other.is_known()) {
+            return "";
+        }
+        " (no size of the whole error: its other parts are not known)"
+    }
+
     /// What it is, and where: `cubic part (coefficient ECY3) of the rotation of Y about Z, at the end of Y 0 to 300 mm`.
     fn in_words(&self) -> String {
         let component = self.curve.component;
@@ -523,6 +555,17 @@ mod tests {
             curve: &curve,
             place: 0,
         };
+        let mut parts = curve.clone();
+        parts.power = vec![3, 1];
+        parts.coefficient = vec![1e-12, f64::NAN];
+        parts.standard_uncertainty = vec![1e-14, f64::NAN];
+        parts.estimable = vec![true, false];
+        let alone = Coefficient {
+            curve: &parts,
+            place: 0,
+        };
+        let words = largest(&[&alone]).unwrap().1;
+        assert!(words.contains("its other parts are not known"), "{words}");
         // By hand: 1e-12 rad/mm^3 * (300 mm)^3 = 27 µrad, twice 0.27 µrad.
         assert_eq!(largest(&[&known]).unwrap().0, "ECY 27.00 ± 0.54 µrad");
     }

@@ -8,7 +8,7 @@ use metrology::Axis;
 use metrology::sample::{GeometryModel, TestPlane};
 use metrology::stamp::Stamp;
 
-use super::geometry::{self, coefficients};
+use super::geometry::{self, Sum, coefficients};
 use super::section::{Rows, Section, head, rounded, um};
 use super::terminal::Rank;
 use crate::evaluate::circles::plane_axes;
@@ -48,13 +48,12 @@ pub fn sections(circle: &StationCircle, all: Option<&GeometryModel>) -> Vec<Sect
         Ok(Some(found)) => {
             let chain = circle.kinematics.chain().to_string();
             let model = geometry_model(&found.determined, &chain, Stamp::from_nanos(0), 1);
+            let title_alone = format!("What the circle of run {run} alone determines");
+            let mut alone = geometry::section_of_one_circle(&title_alone, &model);
+            alone.lines.extend(other_sense(circle, &model));
             vec![
                 comparison((run, title), &found, &of_all).ranked(Rank::Detail),
-                geometry::section(
-                    &format!("What the circle of run {run} alone determines"),
-                    &model,
-                )
-                .ranked(Rank::Detail),
+                alone.ranked(Rank::Detail),
             ]
         }
         Err(error) => {
@@ -63,6 +62,41 @@ pub fn sections(circle: &StationCircle, all: Option<&GeometryModel>) -> Vec<Sect
             vec![section]
         }
     }
+}
+
+/// Which sums the same circle in the other sense contradicts; none where it was not run, or contradicts nothing.
+fn other_sense(circle: &StationCircle, model: &GeometryModel) -> Option<String> {
+    let other = circle.other_sense.as_ref()?;
+    let found = compare(&circle.kinematics, other, OTHER_MM).ok()??;
+    let turned = geometry_model(&found.determined, &model.chain, Stamp::from_nanos(0), 1);
+    let (own, turned) = (geometry::sums(model), geometry::sums(&turned));
+    let pair = |sum| Some((sum, turned.iter().find(|other| is_same(sum, other))?));
+    let pairs: Vec<(&Sum, &Sum)> = own.iter().filter_map(pair).collect();
+    let beyond = |(a, b): &(&Sum, &Sum)| {
+        let u_mm = COVERAGE * a.standard_uncertainty_mm.hypot(b.standard_uncertainty_mm);
+        (a.value_mm - b.value_mm).abs() / u_mm
+    };
+    let contradicted = pairs.iter().filter(|pair| beyond(pair) > 1.0);
+    let n = contradicted.clone().count();
+    let (a, b) = contradicted.max_by(|p, q| beyond(p).total_cmp(&beyond(q)))?;
+    let words = |sum: &Sum| {
+        let expanded_mm = COVERAGE * sum.standard_uncertainty_mm;
+        let (value, u) = rounded(sum.value_mm * 1e3, expanded_mm * 1e3);
+        format!("{value} ± {u} µm")
+    };
+    Some(format!(
+        "Do not use these sums as they stand: run {}, the same circle in the other sense, contradicts {n} of {}. {} is {} here and {} there. One sense cannot tell these errors from a lost motion that is no step.",
+        other.run,
+        pairs.len(),
+        a.in_words(),
+        words(a),
+        words(b)
+    ))
+}
+
+/// Whether both are one sum at one distance.
+fn is_same(a: &Sum, b: &Sum) -> bool {
+    a.in_words() == b.in_words() && (a.at_mm - b.at_mm).abs() < 1e-6
 }
 
 fn comparison(
@@ -313,6 +347,7 @@ mod tests {
                 PerAxis::default(),
             ),
             longest_rest: None,
+            other_sense: None,
             recording: Recording {
                 run: 29,
                 points: (0..360).map(point).collect(),
@@ -342,6 +377,62 @@ mod tests {
             );
             let note = &section.tables[0].note;
             assert!(note.contains("on the negative side odd powers have the other sign"));
+        }
+    }
+
+    /// The circle in one sense, 1 or -1, on a machine whose X and Y lose 6 µm at a reversal: at once, or over an angle.
+    fn run_in_sense(sense: f64, reversal_rad: f64) -> StationCircle {
+        let mut circle = circle(0.0);
+        let place = circle.recording.place;
+        for (k, point) in circle.recording.points.iter_mut().enumerate() {
+            let angle_rad = (k as f64 + 0.5).to_radians();
+            let (sin, cos) = angle_rad.sin_cos();
+            point.positions = place.on_circle_mm(angle_rad);
+            // 0.1 µm of noise, of no order along the circle.
+            let noise_mm = 1e-4 * ((k * 7919 % 360) as f64 / 180.0 - 1.0);
+            for (axis, moves) in [-sense * sin, sense * cos].into_iter().enumerate() {
+                let since_rad = moves.abs().asin();
+                let lost = 1.0 - 2.0 * (-since_rad / reversal_rad).exp();
+                point.sense[axis] = moves.signum();
+                point.reading_mm[axis] =
+                    point.positions.0[axis] - 0.003 * moves.signum() * lost + noise_mm;
+            }
+        }
+        circle
+    }
+
+    /// numpy, `tests/validation/one_circle_two_senses.py`, counter-clockwise.
+    fn is_as_numpy_has_it(figures: &serde_json::Value) {
+        for (name, right_um) in [("EYX3 − EC0Y", 6.1765), ("EXY3 − EYX3 − ECY2", -12.3341)] {
+            let sums = figures["geometry"]["combinations"].as_array().unwrap();
+            let sum = sums.iter().find(|sum| sum["sum"] == name).unwrap();
+            let found_um = sum["value_mm"].as_f64().unwrap() * 1e3;
+            assert!(
+                (found_um / right_um - 1.0).abs() < 1e-2,
+                "{name}: {found_um}"
+            );
+        }
+    }
+
+    #[test]
+    fn val_numpy_a_circle_in_the_other_sense_contradicts_sums_where_lost_motion_is_no_step() {
+        for (reversal_rad, is_step) in [(1e-6, true), (0.3, false)] {
+            let [mut circle, mut other] = [1.0, -1.0].map(|t| run_in_sense(t, reversal_rad));
+            other.recording.run = 30;
+            circle.other_sense = Some(other.recording);
+            let alone = &sections(&circle, None)[1];
+            if !is_step {
+                is_as_numpy_has_it(&alone.figures);
+            }
+            let lines = alone.lines.join(" ");
+            let words = "run 30, the same circle in the other sense, contradicts";
+            assert_eq!(lines.contains(words), !is_step, "{reversal_rad}: {lines}");
+            let note = &alone.tables[0].note;
+            assert!(note.contains("its certificate, heat"), "{note}");
+            assert!(
+                !note.contains("was given the plate's certificate"),
+                "{note}"
+            );
         }
     }
 }

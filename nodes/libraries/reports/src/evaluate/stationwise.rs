@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use grid_encoder::diagnostic::Diagnostic;
-use grid_encoder::recording::Recording;
+use grid_encoder::recording::{Fixture, Place, Recording};
 use grid_encoder::{GridEncoderConfig, GridEncoderStage, Input, Output};
 use machine::{Kinematics, MachineFile};
 use metrology::Stage;
@@ -20,6 +20,8 @@ pub struct StationCircle {
     pub kinematics: Kinematics,
     /// Its stations.
     pub recording: Recording,
+    /// Those of the same circle in the other sense, where it was run.
+    pub other_sense: Option<Recording>,
     /// The longest rest between the first and the last one; none: nothing rested.
     pub longest_rest: Option<Span>,
 }
@@ -175,14 +177,31 @@ impl Stationwise {
         let Some(kinematics) = self.kinematics else {
             return (Vec::new(), self.refused);
         };
-        let of_recording = |recording: Recording| StationCircle {
+        let of_recording = |recording: &Recording| StationCircle {
             kinematics: kinematics.clone(),
             longest_rest: self.longest_rests.get(&recording.run).copied(),
-            recording,
+            other_sense: { self.found.iter() }
+                .find(|other| is_in_the_other_sense(&recording.place, &other.place))
+                .cloned(),
+            recording: recording.clone(),
         };
-        let found = self.found.into_iter().map(of_recording).collect();
+        let found = self.found.iter().map(of_recording).collect();
         (found, self.refused)
     }
+}
+
+/// Whether both are one circle under one set-up, in different senses.
+fn is_in_the_other_sense(place: &Place, other: &Place) -> bool {
+    let fixture = Fixture {
+        zero_id: other.fixture.zero_id,
+        ..place.fixture
+    };
+    let turned = Place {
+        sense: other.sense,
+        fixture,
+        ..*place
+    };
+    place.sense != other.sense && turned == *other
 }
 
 #[cfg(test)]
