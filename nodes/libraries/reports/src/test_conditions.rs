@@ -151,11 +151,16 @@ fn figures_of(
 ) -> Value {
     let imported = seen.imported.as_ref();
     let is_made_up = imported.is_some_and(Imported::is_motion_made_up);
+    let later = seen.production_before_later.iter();
+    let later: Vec<Value> = later
+        .map(|(run, before_s)| json!({ "run": run, "production_before_s": before_s }))
+        .collect();
     json!({
         "begin": seen.nanos().map(|(first, _)| date(Stamp::from_nanos(first))),
         "end": seen.nanos().filter(|_| !is_made_up).map(|(_, last)| date(Stamp::from_nanos(last))),
         "feeds_mm_min": feeds_mm_min(seen),
         "production_before_s": seen.imported.is_none().then_some(seen.production_before_s),
+        "production_before_later": later,
         "warm_up": budget.and_then(|budget| budget.warm_up.clone()),
         "operator": budget.and_then(|budget| budget.operator.clone()),
         "instruments": instruments_json(seen, budget, tests),
@@ -269,7 +274,10 @@ fn run_of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
     conditions
 }
 
-/// A condition of a recording.
+/// Productions between tests that are listed one by one.
+const FEW_PRODUCTIONS: usize = 3;
+
+/// The conditions of a recording.
 fn of_recording(
     seen: &TestConditions,
     between: Option<String>,
@@ -277,7 +285,7 @@ fn of_recording(
     dwells: Option<String>,
 ) -> Vec<Condition> {
     let before_min = seen.production_before_s / 60.0;
-    vec![
+    let mut conditions = vec![
         Condition::new("date", between, "the bag holds no test"),
         Condition::new(
             "feed",
@@ -294,7 +302,25 @@ fn of_recording(
             Some(format!("{before_min:.0} min in this bag")),
             "",
         ),
-    ]
+    ];
+    let later = production_before_later(seen)
+        .map(|later| Condition::new("production before later tests", Some(later), ""));
+    conditions.extend(later);
+    conditions
+}
+
+/// How long production had run when later tests began; none: there was none between the tests.
+fn production_before_later(seen: &TestConditions) -> Option<String> {
+    let words = |(run, before_s): &(u32, f64)| {
+        format!("{:.0} min in this bag before run {run} on", before_s / 60.0)
+    };
+    let later = &seen.production_before_later;
+    if later.len() > FEW_PRODUCTIONS {
+        let (first, last) = (later.first()?, later.last()?);
+        return Some(format!("{}, to {}", words(first), words(last)));
+    }
+    let each: Vec<String> = later.iter().map(words).collect();
+    (!each.is_empty()).then(|| each.join("; "))
 }
 
 /// Where a table and its map say nothing.

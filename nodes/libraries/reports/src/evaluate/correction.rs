@@ -447,7 +447,8 @@ fn body_in_words((temperature, expansion_per_k): &(BodyTemperature, f64)) -> Str
     }
 }
 
-/// By how much the machine grew or shrank while the test lasted, where that is a tenth of a micrometre or more.
+/// By how much the machine may have grown or shrunk while the test lasted, where that is a tenth of a micrometre or more: the
+/// range of single readings holds the thermometer's noise too.
 fn change_in_words(
     (temperature, expansion_per_k): &(BodyTemperature, f64),
     span_mm: f64,
@@ -457,7 +458,7 @@ fn change_in_words(
         return String::new();
     }
     format!(
-        " The machine's change during the test, {grown_um:.2} µm over {span_mm:.0} mm, is not taken out: it is in the scatter of the runs."
+        " By the range of its thermometer the machine changed by {grown_um:.2} µm over {span_mm:.0} mm at most during the test. That is not taken out: the part that is not noise of the thermometer is in the scatter of the runs."
     )
 }
 

@@ -16,6 +16,8 @@ use super::imported::Imported;
 const LONGEST_AGE: Span = Span::from_nanos(600_000_000_000);
 /// Feeds closer than this share of the greater one are one: that of a touch is known to 0.2 %.
 const SAME_FEED: f64 = 0.01;
+/// Less production between tests is the way to a set-up, s.
+const LEAST_PRODUCTION_S: f64 = 60.0;
 /// Tests that touch.
 const TOUCHING: [TestKind; 8] = [
     TestKind::Latency,
@@ -112,6 +114,8 @@ pub struct TestConditions {
     pub feeds_mm_s: Vec<f64>,
     /// How long programs of production ran before the first measurement, s.
     pub production_before_s: f64,
+    /// Later runs before which there was a minute of production or more, with all production of the bag until then, s.
+    pub production_before_later: Vec<(u32, f64)>,
     /// From the first test to the last one.
     pub thermometers: Thermometers,
     /// What is stated of a table that was imported; none of a recording.
@@ -121,6 +125,10 @@ pub struct TestConditions {
     tests: Vec<Test>,
     latest: BTreeMap<String, (Stamp<Host>, f64)>,
     under_way: Option<TestSegment>,
+    /// Production that has ended, s.
+    produced_s: f64,
+    /// When the production began that is under way; blocks are measured within it.
+    produces_since: Option<Stamp<Host>>,
 }
 
 impl TestConditions {
@@ -239,15 +247,32 @@ impl TestConditions {
     }
 
     fn production(&mut self, segment: &TestSegment) {
-        let began = self.under_way.take();
-        if segment.begin {
-            self.under_way = Some(segment.clone());
-        } else if let Some(began) = began.filter(|_| self.between.is_none()) {
-            self.production_before_s += (segment.at - began.at).as_secs_f64();
+        self.under_way = segment.begin.then(|| segment.clone());
+        self.produced_s = self.produced_until_s(segment.at);
+        self.produces_since = segment.begin.then_some(segment.at);
+    }
+
+    /// All production until then, s.
+    fn produced_until_s(&self, at: Stamp<Host>) -> f64 {
+        let since = self.produces_since.map(|since| (at - since).as_secs_f64());
+        self.produced_s + since.unwrap_or(0.0)
+    }
+
+    fn count_production(&mut self, segment: &TestSegment) {
+        let before_s = self.produced_until_s(segment.at);
+        if self.between.is_none() {
+            self.production_before_s = before_s;
+            return;
+        }
+        let known = self.production_before_later.last();
+        let known_s = known.map_or(self.production_before_s, |(_, known_s)| *known_s);
+        if before_s - known_s >= LEAST_PRODUCTION_S {
+            self.production_before_later.push((segment.run, before_s));
         }
     }
 
     fn begin(&mut self, segment: &TestSegment) {
+        self.count_production(segment);
         let is_fresh =
             |(_, (at, _)): &(&String, &(Stamp<Host>, f64))| segment.at - *at <= LONGEST_AGE;
         let latest = self.latest.iter().filter(is_fresh);
@@ -437,8 +462,37 @@ mod tests {
         let all = conditions.thermometers["bed"];
         assert_eq!((all.first_degc, all.last_degc, all.n), (21.0, 25.0, 4));
         assert!((conditions.production_before_s - 600.0).abs() < 1e-9);
+        assert_eq!(conditions.production_before_later, []);
         assert_eq!(conditions.feeds_mm_s, [100.0]);
         let (first, last) = conditions.between.unwrap();
         assert_eq!(last - first, Span::from_nanos(1_395_000_000_000));
+    }
+
+    #[test]
+    fn production_before_later_tests_is_counted_and_so_is_that_around_a_test() {
+        let mut conditions = TestConditions::default();
+        let mut one = |second, run, begin, kind| {
+            conditions.segment(&segment(second, run, begin, kind));
+        };
+        // The second test is preceded by the way to its set-up.
+        for (run, begin_s, end_s, kind) in [
+            (1, 0, 10, TestKind::Positioning),
+            (7, 12, 18, TestKind::Production),
+            (2, 20, 30, TestKind::Positioning),
+        ] {
+            one(begin_s, run, true, kind);
+            one(end_s, run, false, kind);
+        }
+        // An hour, of which the last ten minutes follow a block that is measured meanwhile.
+        one(100, 3, true, TestKind::Production);
+        one(3_100, 4, true, TestKind::Block);
+        one(3_110, 4, false, TestKind::Block);
+        one(3_700, 3, false, TestKind::Production);
+        one(3_710, 5, true, TestKind::Positioning);
+        one(3_720, 5, false, TestKind::Positioning);
+        one(3_730, 6, true, TestKind::Positioning);
+        assert!(conditions.production_before_s.abs() < 1e-9);
+        let later = conditions.production_before_later;
+        assert_eq!(later, [(4, 3_006.0), (5, 3_606.0)]);
     }
 }
