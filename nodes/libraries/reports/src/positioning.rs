@@ -448,7 +448,8 @@ fn remark_in_words(remark: &PositioningRemark) -> String {
             period_mm,
             phase_spread_rad,
         } => format!(
-            "All targets lie within {phase_spread_rad:.2} rad of one phase of the {period_mm:.3} mm period: an error of that period is not seen. Choose targets that are no multiples of it."
+            "All targets are multiples of {period_mm:.3} mm apart, within {:.1} % of it. That is a period of the machine file (lead_mm, periods_mm or scale) or half of one: an error of that period is not seen. Choose targets that are no multiples of it.",
+            100.0 * phase_spread_rad / std::f64::consts::TAU
         ),
     }
 }

@@ -318,6 +318,9 @@ impl Screen {
     }
 }
 
+/// What a tool error is: no instrument read it, and it has no U.
+pub const OF_THE_PLANT: &str = "true error of the simulated plant, read by no instrument";
+
 /// The verdict on a tool error without and with compensation, mm, and its tile; `what` says of which poses.
 #[must_use]
 pub fn compensated(without_mm: f64, with_mm: f64, what: &str) -> Screen {
@@ -342,7 +345,7 @@ pub fn compensated(without_mm: f64, with_mm: f64, what: &str) -> Screen {
     let tile = Tile::new(
         "tool error without → with compensation",
         value,
-        format!("p95, {what}"),
+        format!("p95, {what}; {OF_THE_PLANT}"),
     );
     Screen {
         verdict: Some((sentence, tone)),

@@ -10,7 +10,7 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::screen::{Screen, Tile, Tone, compensated};
+use super::screen::{OF_THE_PLANT, Screen, Tile, Tone, compensated};
 use super::section::{Rows, Section, head, um};
 use super::svg::short;
 use super::vectors::{self, Field};
@@ -125,12 +125,25 @@ pub fn section(verifications: &[Verification]) -> Option<Section> {
             "max about datum",
         ]),
         rows: rows.collect(),
-        note: "Size of the true error of the tool relative to the workpiece, which no node sees; about a datum: the shift and turn that all poses share are taken out, as setting a part up does."
-            .to_owned(),
+        note: note(&seen),
     });
     let figures: Vec<serde_json::Value> = seen.iter().map(|one| figures(one)).collect();
     section.figures = serde_json::json!({ "verifications": figures });
     Some(section)
+}
+
+/// What the table's columns are; those about a datum are left out of the page where no pose has one.
+fn note(seen: &[&Verification]) -> String {
+    let has_datum = |one: &&&Verification| quantile_mm(&sizes_mm(one, true), 0.5).is_finite();
+    let datum = match seen.iter().find(has_datum) {
+        Some(_) => {
+            "; about a datum: the shift and turn that all poses share are taken out, as setting a part up does"
+        }
+        None => "",
+    };
+    format!(
+        "Size of the true error of the tool relative to the workpiece, which the simulated plant knows and no node sees{datum}."
+    )
 }
 
 /// The first screen of the last pair of verifications without and with compensation: of those that their labels name so, else
@@ -170,7 +183,7 @@ fn unpaired(verifications: &[Verification]) -> Screen {
     let others = seen.map(|one| format!("; {}: {} µm", one.label, p95_um(one)));
     let n = last.poses.len();
     let more = format!(
-        "p95 of {n} poses: {}{}",
+        "p95 of {n} poses: {}{}; {OF_THE_PLANT}",
         last.label,
         others.collect::<String>()
     );
@@ -271,6 +284,7 @@ mod tests {
         assert!((quantile_mm(&sizes_mm(&stretched, true), 1.0) - 0.002).abs() < 1e-9);
         let section = section(&[moved.clone(), stretched.clone()]).unwrap();
         assert_eq!(section.lines.len(), 2, "{:?}", section.lines);
+        assert!(section.tables[0].note.contains("about a datum"));
         let screen = super::screen(&[moved.clone(), stretched.clone()]);
         assert!(screen.verdict.is_some() && screen.picture.is_some());
         assert_eq!(screen.tiles[1].value, "0 → 2.00 µm");
@@ -289,6 +303,9 @@ mod tests {
         let more = &alone.tiles[0].more;
         let words = "p95 of 27 poses: after 1 h; cold: ";
         assert!(more.starts_with(words), "{more}");
+        assert!(more.ends_with("read by no instrument"), "{more}");
+        let paired = &screen.tiles[0].more;
+        assert!(paired.ends_with("read by no instrument"), "{paired}");
         let named = |label: &str, is_compensated| Verification {
             label: label.to_owned(),
             is_compensated,
@@ -317,5 +334,8 @@ mod tests {
             pose.commanded_mm.z = 0.0;
         }
         assert!(residuals_mm(&line).is_none());
+        let note = &section(&[line]).unwrap().tables[0].note;
+        assert!(note.contains("the simulated plant knows"), "{note}");
+        assert!(!note.contains("about a datum"), "{note}");
     }
 }

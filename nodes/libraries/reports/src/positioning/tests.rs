@@ -257,7 +257,7 @@ fn targets_on_whole_leads_of_the_machine_file_are_warned_of() {
                 .iter()
                 .filter(|one| one.kind == "Deviates from ISO 230-2")
         };
-        let phase = "one phase of the 10.000 mm period";
+        let phase = "All targets are multiples of 10.000 mm apart, within 0.0 % of it.";
         assert_eq!(kinds().any(|one| one.line.contains(phase)), warned);
         let remark = |line: &String| line.contains(phase);
         assert_eq!(
@@ -271,7 +271,7 @@ fn targets_on_whole_leads_of_the_machine_file_are_warned_of() {
     let mut tests = warm(Reference::Length, &[0.0, 103.1, 206.2, 309.3, 412.4]);
     tests.machine = Some(MachineFile::parse(&text, "machine.yaml").unwrap());
     let section = &sections(&tests, None).unwrap()[0];
-    let remark = |line: &String| line.contains("the 51.550 mm period");
+    let remark = |line: &String| line.contains("multiples of 51.550 mm apart");
     assert!(section.lines.iter().any(remark), "{:?}", section.lines);
 }
 
