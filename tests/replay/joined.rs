@@ -1,10 +1,13 @@
 //! Readings that were recorded late or early, with stamps that are right, and runs that are no repetitions of one another.
 
-use abbe_msgs::msg::{LengthSample, TestSegment};
+use abbe_msgs::msg::{GridSample, LengthSample, TestSegment};
+use abbe_msgs::sensor_msgs::msg::Temperature;
+use abbe_tests::program::root;
+use serde_json::Value;
 
-use crate::contract::edited;
-use crate::out_of_run::{LENGTH, SEGMENT, STATE, changed, imported, places, told};
-use crate::rewrite::Copied;
+use crate::contract::{changed_of, edited};
+use crate::out_of_run::{LENGTH, SEGMENT, STATE, changed, imported, imported_of, places, told};
+use crate::rewrite::{Change, Copied};
 use crate::spoiled::report;
 
 /// Records the messages of topics later by so many seconds.
@@ -34,6 +37,12 @@ fn stops_are_read_by_the_stamps_of_a_topic_that_came_late_throughout() {
         (&[STATE, SEGMENT], 1.5),
         (&[LENGTH], -1.0),
         (&[STATE], -1.0),
+        (&[STATE], 1.9),
+        (&[STATE], 2.0),
+        (&[STATE], -2.0),
+        (&[LENGTH], 1.5),
+        (&[LENGTH], 2.0),
+        (&[LENGTH], -2.0),
         (&[SEGMENT], 6.0),
         (&[SEGMENT], 30.0),
         (&[SEGMENT], -30.0),
@@ -137,5 +146,69 @@ fn two_readings_of_one_stamp_that_differ_leave_their_run_out() {
         assert_eq!(found.code == 0, is_used, "{}", found.said);
         let words = "two readings of one stamp at the stop at ";
         assert_eq!(found.said.contains(words), !is_used, "{}", found.said);
+    }
+}
+
+/// Two recordings of a circle, a log and a thermometer with one time base: each reading is followed by another one of its stamp.
+#[test]
+fn circles_and_logs_with_two_differing_readings_of_each_stamp_are_not_evaluated() {
+    let ballbar = imported_of("ballbar", "gap_first");
+    let log = imported_of("drift", "first_run");
+    let grid = root().join("bags/grid_circles");
+    type Twice<'t> = &'t dyn Fn(&mut Copied, f64);
+    let length: Twice =
+        &|it, m| edited(&mut it.data, |it: &mut LengthSample| it.displacement_m += m);
+    let place: Twice = &|it, m| edited(&mut it.data, |it: &mut GridSample| it.u_m += m);
+    for (bag, topic, twice) in [
+        (ballbar.path().join("bag"), LENGTH, length),
+        (log.path().join("bag"), LENGTH, length),
+        (grid, "/grid/position", place),
+    ] {
+        let whole = report(&bag);
+        assert_eq!(whole.code, 0, "{}", whole.said);
+        for (apart_m, is_used) in [(2e-6, true), (3e-5, false)] {
+            let double = |messages: &mut Vec<Copied>| {
+                for place in places(messages, topic).into_iter().rev() {
+                    let mut second = messages[place].clone();
+                    twice(&mut second, apart_m);
+                    messages.insert(place + 1, second);
+                }
+            };
+            let change = Change {
+                messages: Some(&double),
+                ..Change::default()
+            };
+            let found = report(changed_of(&bag, &change).path());
+            assert_eq!(found.code == 0, is_used, "{topic}: {}", found.said);
+            let words = "times two readings of one stamp differ, by up to 30 µm, at most 5 µm";
+            assert_eq!(found.said.contains(words), !is_used, "{}", found.said);
+            let n_tests = |json: &Value| json["tests"].as_array().map_or(0, Vec::len);
+            let [found, whole] = [&found, &whole].map(|it| n_tests(&it.json));
+            assert_eq!(found == whole, is_used, "{topic}: {found} {whole}");
+        }
+    }
+}
+
+#[test]
+fn a_second_temperature_of_a_stamp_is_left_out_where_it_differs() {
+    let home = imported_of("drift", "first_run");
+    let whole = report(&home.path().join("bag"));
+    for (apart_k, is_used) in [(0.3, true), (3.0, false)] {
+        let bag = changed(&home, &|messages| {
+            let is_temperature = |it: &Copied| it.topic.starts_with("/temperature/");
+            let place = messages.iter().rposition(is_temperature).unwrap();
+            let mut second = messages[place].clone();
+            edited(&mut second.data, |it: &mut Temperature| {
+                it.temperature += apart_k
+            });
+            messages.insert(place + 1, second);
+        });
+        let found = report(bag.path());
+        assert_eq!(found.code == 0, is_used, "{}", found.said);
+        let words = "two readings of one stamp differ by 3 K, at most 0.5 K";
+        assert_eq!(found.said.contains(words), !is_used, "{}", found.said);
+        if !is_used {
+            assert_eq!(found.json["tests"], whole.json["tests"]);
+        }
     }
 }

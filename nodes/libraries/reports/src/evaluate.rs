@@ -16,6 +16,7 @@ mod belonging;
 pub mod budget;
 pub mod circle_reading;
 pub mod circles;
+mod clashes;
 pub mod correction;
 pub mod course;
 pub mod drift;
@@ -36,6 +37,7 @@ use angular::{RotaryRuns, RotaryTest};
 use belonging::Belonging;
 pub use belonging::BrokenOff;
 use circles::{CircleRecording, Circles};
+use clashes::Clashes;
 use drift::{Drift, Drifts};
 use imported::Imported;
 use linear::{LinearRuns, LinearTest};
@@ -134,18 +136,23 @@ struct Collected {
     strays: Strays,
     segment: Option<TestSegment>,
     outside: Outside,
+    clashes: Clashes,
 }
 
 impl Tests {
     /// Reads a bag; what cannot be used is left out and counted.
     pub fn of(bag: &Bag) -> Self {
         let recorded = Self::read(bag, false);
-        if !recorded.reading.are_segments_off {
+        // Begins, ends or readings came late, or bear another clock's stamps: what was read decides. Of readings stops alone can.
+        let values: fn(&Self) -> usize = if recorded.reading.are_segments_off {
+            Self::values
+        } else if recorded.reading.are_readings_off {
+            Self::values_of_stops
+        } else {
             return recorded;
-        }
-        // Begins and ends came late, or bear another clock's stamps: the readings decide.
+        };
         let stamped = Self::read(bag, true);
-        if stamped.values() > recorded.values() {
+        if values(&stamped) > values(&recorded) {
             stamped
         } else {
             recorded
@@ -154,21 +161,21 @@ impl Tests {
 
     /// How many values the figures count.
     fn values(&self) -> usize {
+        let circles = self.circles.iter().map(|it| it.points.len());
+        let paths = self.paths.iter().map(|it| it.points.len());
+        self.values_of_stops() + circles.chain(paths).sum::<usize>()
+    }
+
+    /// The same of positioning tests and diagonals.
+    fn values_of_stops(&self) -> usize {
         let linear = self.linear.iter();
         let linear = linear.flat_map(|it| it.up_mm.iter().chain(&it.down_mm));
         let rotary = self.rotary_positioning.iter();
         let rotary = rotary.flat_map(|it| it.up_rad.iter().chain(&it.down_rad));
-        let circles = self.circles.iter().map(|it| it.points.len());
-        let paths = self.paths.iter().map(|it| it.points.len());
-        linear
-            .chain(rotary)
-            .map(Vec::len)
-            .chain(circles)
-            .chain(paths)
-            .sum()
+        linear.chain(rotary).map(Vec::len).sum()
     }
 
-    fn read(bag: &Bag, are_segments_by_stamp: bool) -> Self {
+    fn read(bag: &Bag, are_all_by_stamp: bool) -> Self {
         let machine = machine_of_bag::of(bag);
         let unreadable = machine.as_ref().err().map(ToString::to_string);
         let machine = machine.ok().flatten().map(|(machine, text)| {
@@ -182,7 +189,7 @@ impl Tests {
             ..Collected::default()
         };
         collected.tests.machine = machine;
-        let reading = reading::read_by_stamp(bag, &WANTED, are_segments_by_stamp, |mut taken| {
+        let reading = reading::read_by_stamp(bag, &WANTED, are_all_by_stamp, |mut taken| {
             collected.message(&mut taken);
         });
         let mut tests = collected.tests;
@@ -202,8 +209,20 @@ impl Tests {
         tests.drift.temperatures_left_out = temperatures_left_out(&tests.reading);
         tests.stops = collected.stops.stops();
         tests.left_out = left_out.unwrap_or_default();
-        tests.name_not_evaluated(runs.measured, &reasons);
+        let mut all = collected.clashes.runs();
+        tests.drop_runs(&all);
+        all.extend(reasons);
+        tests.name_not_evaluated(runs.measured, &all);
         tests
+    }
+
+    /// Takes out what was read in runs whose readings contradict each other.
+    fn drop_runs(&mut self, clashing: &[(u32, String)]) {
+        let is_sound = |run: u32| clashing.iter().all(|(other, _)| *other != run);
+        self.circles.retain(|it| is_sound(it.segment.run));
+        self.station_circles.retain(|it| is_sound(it.recording.run));
+        self.paths.retain(|it| is_sound(it.segment.run));
+        self.drift.logs.retain(|it| is_sound(it.run));
     }
 
     /// Counts a machine file that is no machine file; one that the bag itself cannot give is among its losses already.
@@ -239,6 +258,9 @@ fn temperatures_left_out(reading: &Reading) -> u64 {
 
 impl Collected {
     fn message(&mut self, taken: &mut Taken<'_>) {
+        if !self.is_first_temperature(taken) {
+            return;
+        }
         let is_under_way = self.segment.is_some();
         self.outside.message(taken, is_under_way);
         self.tests.conditions.message(taken);
@@ -261,14 +283,16 @@ impl Collected {
             segment.into_iter().for_each(|it| self.test(it));
         } else if taken.is(&topics::GRID_POSITION) && is_under_way {
             let sample = taken.of(&topics::GRID_POSITION);
-            if let Some(sample) = sample.filter(|it| self.belonging.grid(it, taken)) {
+            let sample = sample.filter(|it| self.belonging.grid(it, taken));
+            if let Some(sample) = sample.filter(|it| self.clashes.grid(it, taken)) {
                 self.circles.grid(&sample);
                 self.paths.grid(&sample);
                 self.stationwise.grid(sample);
             }
         } else if taken.is(&topics::LENGTH_POSITION) && is_under_way {
             let sample = taken.of(&topics::LENGTH_POSITION);
-            if let Some(sample) = sample.filter(|it| self.belonging.length(it, taken)) {
+            let sample = sample.filter(|it| self.belonging.length(it, taken));
+            if let Some(sample) = sample.filter(|it| self.clashes.length(it, taken)) {
                 self.circles.length(&sample);
                 self.linear.length(&sample);
                 self.drifts.length(&sample);
@@ -286,6 +310,20 @@ impl Collected {
         } else {
             self.result(taken);
         }
+    }
+
+    /// Whether a message is no second temperature of one thermometer and stamp that differs from the first.
+    fn is_first_temperature(&mut self, taken: &mut Taken<'_>) -> bool {
+        if !taken.is_named(topics::TEMPERATURE.base) {
+            return true;
+        }
+        let Some(mut sample) = taken.of_member(&topics::TEMPERATURE) else {
+            return true;
+        };
+        if let Some(sensor) = topics::TEMPERATURE.member_of(taken.topic()) {
+            sensor.clone_into(&mut sample.sensor);
+        }
+        self.clashes.temperature(&sample, taken)
     }
 
     /// An axis state; one that the machine of the machine file cannot be in is left out and counted.
@@ -311,6 +349,7 @@ impl Collected {
         self.angular.segment(&segment);
         self.drifts.segment(&segment);
         self.stops.segment(&segment);
+        self.clashes.segment(&segment);
         self.segment = segment.begin.then_some(segment);
     }
 

@@ -18,7 +18,7 @@ const ABOUT: usize = 4;
 const STILL_PART: f64 = 0.2;
 /// As many times the smallest step of all is more than one of the resolution; smaller ones are rounding, mm.
 const RESOLUTIONS: f64 = 3.5;
-const SAME_MM: f64 = 1e-9;
+const ROUNDING_MM: f64 = 1e-9;
 /// Fewer readings have no usual step.
 const LEAST_READINGS: usize = 10;
 
@@ -56,7 +56,7 @@ pub(super) fn far(values: &[(f64, f64)]) -> Vec<String> {
     });
     // A dial shows single steps of its resolution.
     let resolution_mm = moved()
-        .filter(|step_mm| *step_mm > SAME_MM)
+        .filter(|step_mm| *step_mm > ROUNDING_MM)
         .fold(f64::INFINITY, f64::min);
     let least_mm = least_mm.max(RESOLUTIONS * resolution_mm);
     let steps = steps(values).filter(|(_, step_mm)| step_mm.abs() > least_mm);

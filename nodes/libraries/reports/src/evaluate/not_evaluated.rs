@@ -44,7 +44,8 @@ impl Tests {
             && circular::refused(&self.circles).is_empty()
     }
 
-    /// Names the runs of which nothing stands on the page; `reasons` of circles with stops, by their runs.
+    /// Names the runs of which nothing stands on the page; `reasons` by runs: of circles with stops, and of
+    /// readings that contradict each other.
     pub(super) fn name_not_evaluated(
         &mut self,
         measured: Vec<Measured>,
@@ -105,6 +106,7 @@ impl Tests {
                 let mut linear = linear.copied();
                 is_rotary || linear.any(|it| it == run) || slipped.any(|it| it == run)
             }
+            TestKind::Dwell => self.drift.logs.iter().any(|it| it.run == run),
             kind if is_path(kind) && begin.stations == 0 => {
                 self.paths.iter().any(|it| it.segment.run == run)
             }

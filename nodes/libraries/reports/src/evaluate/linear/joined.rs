@@ -77,7 +77,7 @@ impl Readings {
 }
 
 /// Readings of one stamp at rest that lie farther apart contradict each other, mm, and rad of a rotary axis.
-pub(super) const SAME_STAMP_APART: [f64; 2] = [0.005, 5e-5];
+pub(in crate::evaluate) const SAME_STAMP_APART: [f64; 2] = [0.005, 5e-5];
 
 /// Whether the stamps say to which stops readings belong; otherwise the order of recording does.
 pub(in crate::evaluate) fn is_by_stamp(recorded: &[StopRead], stamped: &[StopRead]) -> bool {
