@@ -9,7 +9,7 @@ use reports::loss;
 use reports::machine_defaults;
 use reports::page::fold_details;
 use reports::screen::{Made, Screen};
-use reports::section::Section;
+use reports::section::{FAR, Section};
 use reports::terminal::{self, Part, Rank, Room};
 use reports::whole_file::{Form, Output, check_outputs};
 use reports::{self, Report};
@@ -19,7 +19,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use maud::html;
+use maud::{Markup, html};
 use recorder::Bag;
 use replayer::machines;
 
@@ -280,12 +280,9 @@ fn judged_page(
     let judge = |limits: &Limits| judged_by(limits, &figures, &conditions.section.figures);
     let judged = limits.map(judge).transpose()?;
     let conformance = judged.as_ref().map(|section| section.figures.clone());
+    let far = far(&sections);
     let screen = first_screen::of(tests, &sections, judged.as_ref(), budget.is_some());
     sections.extend(judged);
-    let (mut ordered, details): (Vec<&Section>, Vec<&Section>) = sections
-        .iter()
-        .partition(|section| section.rank < Rank::Detail);
-    ordered.sort_by_key(|section| section.rank);
     Ok(Report {
         title: title.to_owned(),
         screen: Screen {
@@ -297,18 +294,7 @@ fn judged_page(
             std::iter::once(Part::plain(conditions.terminal()))
                 .chain(sections.iter().map(Part::of)),
         ),
-        body: html! {
-            @for line in &lines { p.bad[is_bad] { (line) } }
-            @if let Some(line) = &defaults_line { p { (line) } }
-            @for section in &ordered { (section.html()) }
-            @if details.len() > MOST_DETAILS {
-                (fold_details(details.len(), &html! {
-                    @for section in &details { (section.html()) }
-                }))
-            } @else {
-                @for section in &details { (section.html()) }
-            }
-        },
+        body: body((&lines, is_bad, defaults_line.as_deref()), &sections),
         figures: serde_json::json!({
             "title": title,
             "loss": loss::as_json(&tests.reading),
@@ -319,11 +305,35 @@ fn judged_page(
             "machine_defaults": defaults,
             "not_completed": not_completed(&tests.broken_off),
             "not_evaluated": not_evaluated(&tests.not_evaluated, &sections),
+            "far_from_the_others": far,
             "tests": figures,
             "conformance": conformance,
         }),
         lines: lines.into_iter().chain(defaults_line).collect(),
     })
+}
+
+/// What stands below the first screen: sentences on the whole, then the parts, those of detail last.
+fn body(
+    (lines, is_bad, defaults): (&[String], bool, Option<&str>),
+    sections: &[Section],
+) -> Markup {
+    let (mut ordered, details): (Vec<&Section>, Vec<&Section>) = sections
+        .iter()
+        .partition(|section| section.rank < Rank::Detail);
+    ordered.sort_by_key(|section| section.rank);
+    html! {
+        @for line in lines { p.bad[is_bad] { (line) } }
+        @if let Some(line) = defaults { p { (line) } }
+        @for section in &ordered { (section.html()) }
+        @if details.len() > MOST_DETAILS {
+            (fold_details(details.len(), &html! {
+                @for section in &details { (section.html()) }
+            }))
+        } @else {
+            @for section in &details { (section.html()) }
+        }
+    }
 }
 
 /// Whether nothing was lost or left out, and every test that was measured has a figure.
@@ -369,6 +379,17 @@ fn judged_by(
 fn not_completed(runs: &[BrokenOff]) -> serde_json::Value {
     let row = |it: &BrokenOff| serde_json::json!({ "run": it.run, "test": it.test, "reason": BrokenOff::REASON });
     runs.iter().map(row).collect()
+}
+
+/// The readings and touches that are far from the others and are in the figures, for machines.
+fn far(sections: &[Section]) -> Vec<serde_json::Value> {
+    let of_section = |section: &Section| {
+        let named = section.warnings.iter().filter(|it| it.kind == FAR);
+        let row = |line: &str| serde_json::json!({ "test": section.title, "what": line });
+        let rows: Vec<serde_json::Value> = named.map(|it| row(&it.line)).collect();
+        rows
+    };
+    sections.iter().flat_map(of_section).collect()
 }
 
 /// The runs, and the tests of several runs, that were measured and have no figure, for machines.
@@ -479,6 +500,19 @@ mod tests {
         let whole = page("", &Tests::default(), None).unwrap();
         assert!(whole.figures["loss"].is_null());
         assert!(!whole.terminal().contains("NOT WHOLE"));
+    }
+
+    #[test]
+    fn what_is_far_from_the_others_is_in_the_json_with_its_test() {
+        let mut section = Section::new("Probing errors");
+        assert!(far(std::slice::from_ref(&section)).is_empty());
+        section.name_far(&["touch 16 of 25 makes the form error 283.67 µm".to_owned()]);
+        section.warn("Left out", "Left out: run 2.".to_owned());
+        let wanted = serde_json::json!({
+            "test": "Probing errors",
+            "what": "Touch 16 of 25 makes the form error 283.67 µm.",
+        });
+        assert_eq!(far(&[section]), [wanted]);
     }
 
     #[test]

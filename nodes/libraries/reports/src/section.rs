@@ -65,6 +65,9 @@ pub struct Section {
     pub unevaluated: Option<String>,
 }
 
+/// Kind of the warnings of readings that are far from the others and count.
+pub const FAR: &str = "Far from the others";
+
 /// A sentence on what was not evaluated or not used.
 #[derive(Clone, Debug)]
 pub struct Warning {
@@ -129,7 +132,7 @@ impl Section {
     /// A line for every reading that is far from the others and counts.
     pub fn name_far(&mut self, far: &[String]) {
         for line in far {
-            self.warn("Far from the others", format!("{}.", capitalised(line)));
+            self.warn(FAR, format!("{}.", capitalised(line)));
         }
     }
 
