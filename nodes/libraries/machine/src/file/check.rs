@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use metrology::{Axis, Bound, leaves};
+use nalgebra::Vector3;
 
 use super::{
     ArtefactEntry, AxisEntry, BlockEntry, LinearAxisEntry, MachineFile, PositionFeedback,
@@ -12,6 +13,8 @@ use crate::chain::Chain;
 use crate::cycle::artefact_id;
 use crate::error::MachineFileError;
 
+/// Nearer corners are those of one block, mm.
+const SAME_CORNER_MM: f64 = 1.0;
 const FINITE: &str = "must be a finite number";
 /// Magnitude of any number of the file, in the unit of its key: products of a few of them stay finite.
 const GREATEST_NUMBER: f64 = 1e12;
@@ -298,6 +301,7 @@ impl Check<'_> {
             let key = format!("blocks[{index}]");
             self.block(&key, block)?;
             self.new_id(&format!("{key}.id"), &block.id, &mut ids)?;
+            self.own_place(&key, block, file.blocks.iter().take(index))?;
         }
         for (index, artefact) in file.artefacts.iter().enumerate() {
             let key = format!("artefacts[{index}]");
@@ -329,11 +333,31 @@ impl Check<'_> {
         Ok(())
     }
 
+    /// Refuses a block at the corner of another one: the line was copied.
+    fn own_place<'b>(
+        &self,
+        key: &str,
+        block: &BlockEntry,
+        others: impl Iterator<Item = &'b BlockEntry>,
+    ) -> Result<(), MachineFileError> {
+        let corner_mm = Vector3::from(block.corner_mm);
+        for (place, other) in others.enumerate() {
+            let apart_mm = (corner_mm - Vector3::from(other.corner_mm)).norm();
+            self.number(
+                &format!("{key}.corner_mm less blocks[{place}].corner_mm"),
+                apart_mm,
+                apart_mm >= SAME_CORNER_MM,
+                "must be at least 1 mm: two blocks stand at two places",
+            )?;
+        }
+        Ok(())
+    }
+
     fn artefact(&self, key: &str, artefact: &ArtefactEntry) -> Result<(), MachineFileError> {
         let ArtefactEntry::Plane { normal, .. } = artefact else {
             return Ok(());
         };
-        let norm = nalgebra::Vector3::from(*normal).norm();
+        let norm = Vector3::from(*normal).norm();
         let rule = "must have a length above 1e-9";
         self.number(&format!("{key}.normal"), norm, norm > 1e-9, rule)
     }

@@ -320,6 +320,15 @@ fn numbers_and_lists_beyond_their_bounds_are_refused_by_key_value_and_bound() {
         assert!(said.contains(words), "{said}");
     }
     let mut file = MachineFile::parse(BENCH, "m.yaml").unwrap();
+    file.blocks[1].corner_mm = file.blocks[0].corner_mm;
+    let said = file.check("m.yaml").unwrap_err().to_string();
+    let begin = "m.yaml: blocks[1].corner_mm less blocks[0].corner_mm = 0";
+    assert!(said.starts_with(begin), "{said}");
+    assert!(
+        said.ends_with("must be at least 1 mm: two blocks stand at two places"),
+        "{said}"
+    );
+    let mut file = MachineFile::parse(BENCH, "m.yaml").unwrap();
     let block = file.blocks[0].clone();
     file.blocks = vec![block; 1_001];
     let said = file.check("m.yaml").unwrap_err().to_string();

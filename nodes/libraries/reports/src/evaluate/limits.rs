@@ -363,6 +363,11 @@ mod tests {
                 "{lower_arcsec: 5.0, upper_arcsec: -4.0}",
                 "must be below upper_arcsec",
             ),
+            (
+                "{upper_um: -20.0}",
+                "accuracy.upper_um = -20 µm: must be above 0",
+            ),
+            ("{upper_um: 0.0}", "must be above 0"),
             ("{}", "has no limit: state lower_um"),
             ("{upper_um: 5.0, upper_arcsec: 4.0}", "in µm and in arcsec"),
         ] {

@@ -29,6 +29,16 @@ const GREATEST_ARCSEC: f64 = 1_296_000.0;
 /// Greatest magnitude of another limit: that of a figure in a history.
 const GREATEST_OTHER: f64 = 1e12;
 
+/// Figures that are never negative, by the last part of their names.
+const NEVER_NEGATIVE: [&str; 6] = [
+    "accuracy",
+    "repeatability",
+    "systematic_error",
+    "mean_systematic_error",
+    "reversal",
+    "circular_error",
+];
+
 /// Lower and upper limit, the ending of their keys, and the greatest magnitude.
 type Family = (Option<f64>, Option<f64>, &'static str, f64);
 
@@ -67,6 +77,16 @@ impl Limit {
                 let [lower, upper] = [lower, upper].map(|one| quantity(&key, one));
                 return Err(format!(
                     "{key} = {lower}: must be below upper{unit} = {upper}: exchange them"
+                ));
+            }
+            let last = place.rsplit('.').next().unwrap_or(place);
+            if let Some(upper) = upper.filter(|upper| *upper <= 0.0)
+                && NEVER_NEGATIVE.contains(&last)
+            {
+                let key = format!("{place}.upper{unit}");
+                let upper = quantity(&key, upper);
+                return Err(format!(
+                    "{key} = {upper}: must be above 0, for the figure is never negative: nothing would conform"
                 ));
             }
         }
