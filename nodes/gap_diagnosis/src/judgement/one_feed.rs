@@ -43,7 +43,7 @@ use crate::search::rows::count;
 use crate::search::signature::{Instance, Library};
 
 const PLAY: &str = "backlash";
-const BY_FEED: &str = "feed_lost_motion";
+const FEED_LOST_MOTION: &str = "feed_lost_motion";
 const SPIKE: &str = "reversal_spike";
 const WIND_UP: &str = "friction_windup";
 /// The parameter v_s of (2).
@@ -69,7 +69,7 @@ pub(crate) fn list(stack: &Stack<'_>, signatures: &Library, members: &mut [Membe
             continue;
         };
         let id = instance.kind.id;
-        if member.status() == Status::Surrogate || (id != PLAY && id != BY_FEED) {
+        if member.status() == Status::Surrogate || (id != PLAY && id != FEED_LOST_MOTION) {
             continue;
         }
         let values = &member.estimate.values;
@@ -82,7 +82,7 @@ pub(crate) fn list(stack: &Stack<'_>, signatures: &Library, members: &mut [Membe
             .iter()
             .position(|p| p.name == SPEED);
         let rival = if id == PLAY {
-            (fastest <= ONE_FEED * slowest).then_some(BY_FEED)
+            (fastest <= ONE_FEED * slowest).then_some(FEED_LOST_MOTION)
         } else {
             let speed_mm_s = speed.map(|place| values[place]);
             let is_gone = |speed_mm_s: f64| (-slowest / speed_mm_s).exp() < GONE;
@@ -102,22 +102,29 @@ fn feeds_mm_s(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> Option<
         let rows = signature.rows(block.start, block.rows.len());
         rows.norm_squared() >= least
     });
-    let feeds = blocks.filter_map(|block| feed_mm_s(&stack.session.runs[block.run].motion));
+    let feeds = blocks.filter_map(|block| {
+        let motion = &stack.session.runs[block.run].motion;
+        let read = block.rows.iter().filter_map(|row| row.tick);
+        // Where an axis stands while it is read the whole run says how it came there.
+        feed_mm_s(motion, read).or_else(|| feed_mm_s(motion, 0..motion.time_s.len()))
+    });
     feeds.fold(None, |range, feed| {
         let [low, high] = range.unwrap_or([feed, feed]);
         Some([feed.min(low), feed.max(high)])
     })
 }
 
-/// The feed of a run, (1).
-fn feed_mm_s(motion: &Motion) -> Option<f64> {
+/// The feed of a run, (1), by some of its ticks.
+fn feed_mm_s(motion: &Motion, ticks: impl Iterator<Item = usize>) -> Option<f64> {
     let speed = |tick: usize| -> f64 {
         let along = Axis::LINEAR.iter();
         let along = along.filter_map(|axis| motion.velocity[*axis].get(tick));
         along.map(|speed| speed.powi(2)).sum::<f64>().sqrt()
     };
-    let speeds = (0..motion.time_s.len()).map(speed);
-    let mut speeds: Vec<f64> = speeds.filter(|speed| *speed > STANDS_MM_S).collect();
+    let mut speeds: Vec<f64> = ticks
+        .map(speed)
+        .filter(|speed| *speed > STANDS_MM_S)
+        .collect();
     speeds.sort_by(f64::total_cmp);
     let last = speeds.len().checked_sub(1)?;
     let place = (SHARE_BELOW * count(last)) as usize;

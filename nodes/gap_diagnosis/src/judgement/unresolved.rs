@@ -58,7 +58,7 @@ const SMOOTH_DEGREE: i32 = 3;
 const TARGETS_A_PERIOD: f64 = 2.5;
 const TARGETS_MORE: f64 = 4.0;
 /// Periods of which a curve of slower waves follows half.
-const PERIODS: f64 = 4.0;
+const MIN_PERIODS_ALONE: f64 = 4.0;
 
 /// Lists the periodic error of an axis with a curve that may be one, and the curve with a periodic error of few targets.
 pub(crate) fn list_periodic(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) {
@@ -149,7 +149,7 @@ fn has_few_targets(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> bo
         return false;
     };
     let periods = (high - low) / period_mm;
-    let is_short = periods < PERIODS;
+    let is_short = periods < MIN_PERIODS_ALONE;
     let needed = TARGETS_A_PERIOD * periods + TARGETS_MORE;
     resolved::is_at_targets(stack, axis) && (is_short || count(targets.len()) < needed)
 }
