@@ -28,6 +28,8 @@ pub mod doubled;
 pub mod lacking;
 #[path = "../../nodes/abbe/src/import/laser_conditions.rs"]
 pub mod laser_conditions;
+#[path = "../../nodes/abbe/src/import/laser_owner.rs"]
+pub mod laser_owner;
 #[path = "../../nodes/abbe/src/import/laser_passes.rs"]
 pub mod laser_passes;
 #[path = "../../nodes/abbe/src/import/limits.rs"]

@@ -34,6 +34,7 @@ mod hidden;
 mod instrument;
 mod lacking;
 mod laser_conditions;
+mod laser_owner;
 mod laser_passes;
 pub(crate) mod limits;
 mod listed;

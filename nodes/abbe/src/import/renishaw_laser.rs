@@ -36,21 +36,10 @@ use anyhow::{Context, Result, bail};
 use metrology::Axis;
 
 use super::laser_conditions;
+use super::laser_owner;
 use super::laser_passes::{self, Passes, Reading, is_empty};
 use super::sheet::{Cells, MOST_CELLS, Sheet};
 
-/// Words for the owner of a file that is of another measurement.
-const OTHER_TESTS: [&str; 9] = [
-    "straight",
-    "velocity",
-    "squareness",
-    "pitch",
-    "yaw",
-    "roll",
-    "flatness",
-    "parallel",
-    "dynamic",
-];
 /// Most targets of a file.
 const MOST_TARGETS: usize = 100_000;
 /// Columns of the table that is made.
@@ -289,11 +278,7 @@ impl File {
     fn kind(&self) -> Result<Kind> {
         let named = self.value("HEADER", "file type").to_lowercase();
         let owner = self.value("HEADER", "owner").to_lowercase();
-        let words = || owner.split(|letter: char| !letter.is_alphabetic());
-        let is_named = |other: &&&str| words().any(|word| word.starts_with(**other));
-        if let Some(other) = OTHER_TESTS.iter().find(is_named) {
-            bail!("Owner is {owner:?}: {other} is no positioning test, and is not read");
-        }
+        laser_owner::check(&owner, named == "rtl")?;
         let is_linear = named == "rtl" || (named.is_empty() && owner.contains("linear"));
         match (is_linear, self.axis()) {
             (true, Some(axis)) if !axis.is_linear() => bail!(
