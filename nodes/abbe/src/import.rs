@@ -52,6 +52,7 @@ mod prose;
 mod quantities;
 mod recognise;
 mod renishaw_laser;
+mod rest;
 mod returns;
 mod runs;
 mod said_of_numbers;
@@ -207,14 +208,9 @@ pub(crate) fn import(
     machine: Named,
     output: &Path,
 ) -> Result<Imported> {
-    let in_map = |error: &dyn std::fmt::Display| {
-        let said = yaml::placed(&named.place, &named.text, &error.to_string());
-        anyhow!("map {said}")
-    };
-    let map: Map = yaml::read_letters(&named.text).map_err(|error| in_map(&error))?;
     let machine_text = machine.text;
     let machine = MachineFile::parse(&machine_text, &machine.place)?;
-    limits::check(&map, &machine).map_err(|error| in_map(&error))?;
+    let (map, place) = map_for(named, &machine)?;
     let ranges = limits::ranges(&map.test, &machine);
     let in_table = || format!("table {}", csv.display());
     let form = Form {
@@ -246,6 +242,7 @@ pub(crate) fn import(
     let written = writer.finish()?;
     folder.finish()?;
     let mut notes = doubts(&map, &runs);
+    notes.extend(place);
     notes.extend(written.in_words());
     notes.extend(cells.form.map(str::to_owned));
     notes.extend(cells.note);
@@ -267,6 +264,18 @@ pub(crate) fn import(
         n_lost_runs: n_lost,
         notes,
     })
+}
+
+/// The map of a table of this machine, and a line on the places that are assumed.
+fn map_for(named: &Named, machine: &MachineFile) -> Result<(Map, Option<String>)> {
+    let in_map = |error: &dyn std::fmt::Display| {
+        let said = yaml::placed(&named.place, &named.text, &error.to_string());
+        anyhow!("map {said}")
+    };
+    let mut map: Map = yaml::read_letters(&named.text).map_err(|error| in_map(&error))?;
+    limits::check(&map, machine).map_err(|error| in_map(&error))?;
+    let place = rest::assume(&mut map, machine);
+    Ok((map, place))
 }
 
 /// Targets of a positioning test that every run reads from one side alone.

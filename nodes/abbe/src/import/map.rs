@@ -29,7 +29,8 @@ pub struct Map {
     pub sheet: Option<String>,
     /// When the measurement began, s since the epoch.
     pub start_s: i64,
-    /// Where the axes stand that the test does not move, mm.
+    /// Where the axes stand that the test does not move, mm; of a positioning test half-way to the farther end of the travel where
+    /// nobody stated it, at most 250 mm from zero, otherwise zero.
     #[serde(default)]
     pub at_mm: BTreeMap<Axis, f64>,
     /// Units of the columns that are not in the unit that their key ends with.

@@ -523,6 +523,9 @@ fn sensor_id(name: &str, n: usize) -> String {
     }
 }
 
+/// Name of the machine of a table that states none.
+pub const NO_MACHINE: &str = "not_stated";
+
 /// A machine of which nothing is stated but what a map names, wide enough for any table.
 pub fn machine_for(map: &Map) -> String {
     let (axis, sensors) = match &map.test {
@@ -536,7 +539,7 @@ pub fn machine_for(map: &Map) -> String {
     };
     let linear = "{travel_mm: [-100000.0, 100000.0], feed_limit_mm_min: 1000000.0}";
     let rotary = "{travel_deg: [-3600.0, 3600.0], feed_limit_deg_min: 1000000.0, acceleration_limit_deg_s2: 1000.0, position_gain_per_s: 40.0, velocity_feedforward: 0.98, encoder_resolution_arcsec: 0.1}";
-    let mut text = String::from("name: not_stated\n");
+    let mut text = format!("name: {NO_MACHINE}\n");
     if axis.is_linear() {
         text.push_str("chain: \"[w X' Y' b Z t]\"\n");
     } else {
