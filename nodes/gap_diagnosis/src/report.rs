@@ -7,12 +7,16 @@
 
 pub(crate) mod description;
 pub mod figures;
+pub(crate) mod floor;
+pub(crate) mod follows;
 pub(crate) mod localise;
 pub(crate) mod places;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+pub use self::floor::Vibration;
+pub use self::follows::Follows;
 pub use crate::judgement::{Check, CheckId, Side, Verdict};
 
 /// Name and version of this form.
@@ -50,6 +54,9 @@ pub struct GapReport {
     /// What changed between repeats and no named effect explains, or a set-up that moved would make as well; absent where nothing did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub does_not_repeat: Vec<DoesNotRepeat>,
+    /// Channels of logs that go with thermometers; absent where none does.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub follows: Vec<Follows>,
     /// What of each bag was lost or left out, null where nothing was; absent where all were whole.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub loss: Vec<Value>,
@@ -161,6 +168,9 @@ pub struct NoiseFloor {
     pub repeats: usize,
     /// Whether the residual's own scatter agrees with what the repeats show.
     pub reproduced: bool,
+    /// Vibrations that are alike in the runs; absent where none is found.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub vibrations: Vec<Vibration>,
 }
 
 /// Size of the gap.

@@ -56,8 +56,8 @@ const SHARE_BELOW: f64 = 0.9;
 const MIN_COSINE_OF_PLAY: f64 = 0.95;
 /// (2).
 const GONE: f64 = 0.05;
-/// A block that has less than this share of a signature's square does not show it.
-const SHOWN: f64 = 0.01;
+/// A block in which a signature has a smaller size over noise does not show it.
+const MIN_D_SHOWN: f64 = 2.0;
 /// Below this speed an axis stands, mm/s.
 const STANDS_MM_S: f64 = 1e-3;
 
@@ -68,39 +68,62 @@ pub(crate) fn list(stack: &Stack<'_>, signatures: &Library, members: &mut [Membe
         let Target::Axis(axis) = instance.target else {
             continue;
         };
-        let id = instance.kind.id;
-        if member.status() == Status::Surrogate || (id != PLAY && id != FEED_LOST_MOTION) {
+        if member.status() == Status::Surrogate {
             continue;
         }
         let values = &member.estimate.values;
-        let Some([slowest, fastest]) = feeds_mm_s(stack, instance, values) else {
-            continue;
+        let rival = match instance.kind.id {
+            PLAY => is_of_one_feed(stack, instance, values).then_some((FEED_LOST_MOTION, 1.0)),
+            FEED_LOST_MOTION => {
+                is_gone_between_turns(stack, instance, values).then_some((SPIKE, 1.0))
+            }
+            WIND_UP => cosine_of_play(stack, instance, values).map(|cos| (PLAY, cos)),
+            _ => None,
         };
-        let speed = instance
-            .kind
-            .parameters
-            .iter()
-            .position(|p| p.name == SPEED);
-        let rival = if id == PLAY {
-            (fastest <= ONE_FEED * slowest).then_some(FEED_LOST_MOTION)
-        } else {
-            let speed_mm_s = speed.map(|place| values[place]);
-            let is_gone = |speed_mm_s: f64| (-slowest / speed_mm_s).exp() < GONE;
-            speed_mm_s.is_some_and(is_gone).then_some(SPIKE)
-        };
-        if let Some(rival) = rival {
-            unresolved::list(member, rival, &axis.to_string(), 1.0);
+        if let Some((rival, cos)) = rival {
+            unresolved::list(member, rival, &axis.to_string(), cos);
         }
     }
+}
+
+/// (1).
+fn is_of_one_feed(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> bool {
+    let feeds = feeds_mm_s(stack, instance, values);
+    feeds.is_some_and(|[slowest, fastest]| fastest <= ONE_FEED * slowest)
+}
+
+/// (2).
+fn is_gone_between_turns(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> bool {
+    let mut parameters = instance.kind.parameters.iter().zip(values);
+    let speed = parameters.find_map(|(own, value)| (own.name == SPEED).then_some(*value));
+    let feeds = feeds_mm_s(stack, instance, values);
+    let is_gone = |([slowest, _], speed): ([f64; 2], f64)| (-slowest / speed).exp() < GONE;
+    feeds.zip(speed).is_some_and(is_gone)
+}
+
+/// (3), where it holds.
+fn cosine_of_play(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> Option<f64> {
+    let play = effects::kind(PLAY)?;
+    let own = stack.signature(&*instance.effect(values));
+    let all: Vec<&Parameter> = play.parameters.iter().chain(play.free).collect();
+    let sizes = (0..all.len()).filter(|place| all[*place].role == Role::Amplitude);
+    let columns = sizes.map(|place| {
+        let mut values = vec![0.0; all.len()];
+        values[place] = 1.0;
+        stack.signature(&*(play.build)(instance.target.clone(), &values))
+    });
+    let columns = columns.filter(|column| column.norm() > 1e-6);
+    let basis = orthonormal(own.len(), columns);
+    let cos = basis.tr_mul(&own).norm() / own.norm().max(f64::MIN_POSITIVE);
+    (cos >= MIN_COSINE_OF_PLAY).then_some(cos)
 }
 
 /// Slowest and fastest feed of the runs that show an effect; `None` where no run moves.
 fn feeds_mm_s(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> Option<[f64; 2]> {
     let signature = stack.signature(&*instance.effect(values));
-    let least = SHOWN * signature.norm_squared();
     let blocks = stack.rows.blocks.iter().filter(|block| {
         let rows = signature.rows(block.start, block.rows.len());
-        rows.norm_squared() >= least
+        rows.norm() >= MIN_D_SHOWN
     });
     let feeds = blocks.filter_map(|block| {
         let motion = &stack.session.runs[block.run].motion;

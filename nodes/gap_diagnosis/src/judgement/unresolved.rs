@@ -11,7 +11,7 @@
 //! ```
 //!
 //! From [`MIN_COSINE_LISTED`] on the periodic error is listed with it: the recording cannot separate them. The same holds for what
-//! a smooth curve, a cubic over the travel, leaves of f, with the waves of a turn and of half a turn: from
+//! a smooth curve, a cubic over the travel, leaves of f, with the waves of a turn and of half a turn, and of the periods near a turn: from
 //! [`MIN_COSINE_ROUGH`] on, where that is itself as large as what is named. An error that begins with one wave a turn can be in a
 //! curve of any shape beside a smooth lead error.
 //!
@@ -22,7 +22,7 @@
 //! ```
 //!
 //! A wave has two parameters a period: with hardly more targets a curve goes through them as well. Of three periods a curve of slower
-//! waves follows more than half.
+//! waves follows more than half. Where a curve of the same axis was found beside it, the wave may be part of that.
 //!
 //! # Holds when
 //! The period is the lead. A curve with other waves in it is no periodic error of the screw, whatever the targets resolve.
@@ -52,6 +52,8 @@ const PERIODIC: &str = "cyclic_error";
 const MIN_COSINE_LISTED: f64 = 0.9;
 /// The same of what a smooth curve leaves, with four waves: four of many targets are far below it by chance.
 const MIN_COSINE_ROUGH: f64 = 0.8;
+/// Periods a turn of what turns with the screw, or a gear or belt beside it.
+const PER_TURN: [f64; 9] = [0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.4, 1.6];
 /// Degree of a smooth curve.
 const SMOOTH_DEGREE: i32 = 3;
 /// Targets of a period, and those of what else is fitted, below which a curve goes through them as well.
@@ -62,6 +64,12 @@ const MIN_PERIODS_ALONE: f64 = 4.0;
 
 /// Lists the periodic error of an axis with a curve that may be one, and the curve with a periodic error of few targets.
 pub(crate) fn list_periodic(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) {
+    let curves: Vec<Target> = { members.iter() }
+        .filter(|member| member.status() != Status::Surrogate)
+        .map(|member| &signatures.instances[signatures.forms[member.form].instance])
+        .filter(|instance| instance.kind.id == CURVE)
+        .map(|instance| instance.target.clone())
+        .collect();
     for member in members {
         let instance = &signatures.instances[signatures.forms[member.form].instance];
         let Target::Axis(axis) = instance.target else {
@@ -79,7 +87,9 @@ pub(crate) fn list_periodic(stack: &Stack<'_>, signatures: &Library, members: &m
                 whole.or_else(rough).map(|cos| (PERIODIC, cos))
             }
             PERIODIC => {
-                has_few_targets(stack, instance, &member.estimate.values).then_some((CURVE, 1.0))
+                let is_beside = curves.contains(&instance.target);
+                is_part_of_curve(stack, instance, &member.estimate.values, is_beside)
+                    .then_some((CURVE, 1.0))
             }
             _ => None,
         };
@@ -108,7 +118,7 @@ pub(crate) fn list(member: &mut Member, effect: &str, axis: &str, cos: f64) {
 
 /// (1); `None` where the curve is zero or the axis has no lead.
 fn cosine(stack: &Stack<'_>, axis: Axis, curve: &DVector<f64>) -> Option<f64> {
-    let waves = waves(stack, axis, 1)?.into_iter().filter(is_seen);
+    let waves = waves(stack, axis, &[1.0])?.into_iter().filter(is_seen);
     let waves = orthonormal(stack.rows.len, waves);
     let whole = curve.norm();
     (whole > 0.0).then(|| waves.tr_mul(curve).norm() / whole)
@@ -129,19 +139,37 @@ fn rough_cosine(stack: &Stack<'_>, axis: Axis, curve: &DVector<f64>) -> Option<f
     let smooth = orthonormal(stack.rows.len, smooth);
     let without = |column: &DVector<f64>| column - &smooth * smooth.tr_mul(column);
     let rough = without(curve);
-    let waves = waves(stack, axis, 2)?;
-    let waves = waves.iter().map(without).filter(is_seen);
-    let waves = orthonormal(stack.rows.len, waves);
     let size = rough.norm();
-    let cos = waves.tr_mul(&rough).norm() / size.max(f64::MIN_POSITIVE);
+    let share = |per_turn: f64| {
+        let waves = waves(stack, axis, &[per_turn, 2.0 * per_turn])?;
+        let waves = waves.iter().map(without).filter(is_seen);
+        let waves = orthonormal(stack.rows.len, waves);
+        Some(waves.tr_mul(&rough).norm() / size.max(f64::MIN_POSITIVE))
+    };
+    // Far targets make every wave also one of some period near a turn: only that of a turn is looked for.
+    let periods: &[f64] = if resolved::is_coarse(stack, axis) {
+        &[1.0]
+    } else {
+        &PER_TURN
+    };
+    let shares = periods.iter().filter_map(|per_turn| share(*per_turn));
+    let cos = shares.fold(0.0, f64::max);
     (size >= MIN_D_TO_NAME && cos >= MIN_COSINE_ROUGH).then_some(cos)
 }
 
-/// (2), where the axis was read at targets alone.
-fn has_few_targets(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> bool {
+/// Whether a periodic error at targets may be part of a curve: (2), or a curve of that axis was found beside it.
+fn is_part_of_curve(
+    stack: &Stack<'_>,
+    instance: &Instance,
+    values: &[f64],
+    is_beside: bool,
+) -> bool {
     let Target::Axis(axis) = instance.target else {
         return false;
     };
+    if !resolved::is_at_targets(stack, axis) {
+        return false;
+    }
     let span =
         resolved::extent_mm(stack, axis).zip(resolved::period_mm(stack, instance, axis, values));
     let (Some(targets), Some(([low, high], period_mm))) = (resolved::targets(stack, axis), span)
@@ -151,17 +179,17 @@ fn has_few_targets(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> bo
     let periods = (high - low) / period_mm;
     let is_short = periods < MIN_PERIODS_ALONE;
     let needed = TARGETS_A_PERIOD * periods + TARGETS_MORE;
-    resolved::is_at_targets(stack, axis) && (is_short || count(targets.len()) < needed)
+    is_beside || is_short || count(targets.len()) < needed
 }
 
-/// Sine and cosine of the lead and of its shares to this one over the places, whitened.
-fn waves(stack: &Stack<'_>, axis: Axis, most: u8) -> Option<Vec<DVector<f64>>> {
+/// Sine and cosine of so many periods a turn over the places, whitened.
+fn waves(stack: &Stack<'_>, axis: Axis, per_turn: &[f64]) -> Option<Vec<DVector<f64>>> {
     let lead_mm = stack.twin.machine().linear(axis)?.lead_mm;
-    let rad = move |at_mm: f64, n: u8| TAU * f64::from(n) * at_mm / lead_mm;
-    let waves = (1..=most).flat_map(|n| {
+    let rad = |at_mm: f64, n: f64| TAU * n * at_mm / lead_mm;
+    let waves = per_turn.iter().flat_map(|n| {
         [
-            column(stack, axis, |at_mm| rad(at_mm, n).sin()),
-            column(stack, axis, |at_mm| rad(at_mm, n).cos()),
+            column(stack, axis, |at_mm| rad(at_mm, *n).sin()),
+            column(stack, axis, |at_mm| rad(at_mm, *n).cos()),
         ]
     });
     Some(waves.collect())

@@ -34,6 +34,35 @@ pub struct Figures {
     /// Intervals of the shares of the report's places, in their order; absent where too few runs were read.
     #[serde(default)]
     pub share_intervals: Vec<Option<[f64; 2]>>,
+    /// Drift of each channel of the logs.
+    #[serde(default)]
+    pub drifts: Vec<Drift>,
+}
+
+/// Drift of a channel of the logs, with a model and the temperatures beside it, at the same instants.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Drift {
+    /// The channel.
+    pub channel: String,
+    /// Since the session's begin, h.
+    pub time_h: Vec<f64>,
+    /// Machine minus simulator, µm.
+    pub deviation_um: Vec<f64>,
+    /// What thermometers, else the named effects, say of it, µm; empty without either.
+    pub model_um: Vec<f64>,
+    /// Whether the model is that of thermometers.
+    pub is_by_thermometers: bool,
+    /// All thermometers that were read.
+    pub temperatures: Vec<Temperature>,
+}
+
+/// A thermometer at the instants of a [`Drift`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Temperature {
+    /// Its name in the machine file.
+    pub thermometer: String,
+    /// What it read, °C.
+    pub degc: Vec<f64>,
 }
 
 /// One of several named effects by itself, on held-out runs.
@@ -152,6 +181,8 @@ pub enum Note {
     InParts { parts: usize, minutes: f64 },
     /// A log goes with thermometers: how much they explain of runs that they were not fitted to.
     GoesWith { channel: String, found: ThermalFit },
+    /// The spindle's growth came out negative: for 10 K (without a thermometer: in the end).
+    ShrinksWarming { um: f64, by_thermometer: bool },
     /// A thermometer was silent for longer than usual: the longest time, the runs before and after it, and how often besides.
     Unread {
         thermometer: String,
@@ -374,6 +405,7 @@ impl fmt::Display for Note {
                 lowers,
             } => noise_within(f, channel, [*sigma_um, *between_um], *lowers),
             Self::GoesWith { channel, found } => by_thermometers(f, channel, found),
+            Self::ShrinksWarming { um, by_thermometer } => shrinks(f, *um, *by_thermometer),
             Self::InParts { parts, minutes } => in_parts(f, *parts, *minutes),
             Self::Unread {
                 thermometer,
@@ -422,6 +454,19 @@ impl fmt::Display for Note {
             Self::Course(course) => course.fmt(f),
         }
     }
+}
+
+fn shrinks(f: &mut fmt::Formatter<'_>, um: f64, by_thermometer: bool) -> fmt::Result {
+    let over = if by_thermometer {
+        "for 10 K"
+    } else {
+        "in the end"
+    };
+    write!(
+        f,
+        "growth of the spindle is negative ({um:.1} µm {over}): Z shrinks while the spindle warms; check the sign of the \
+         gauge, as a nose that comes down reads as negative Z"
+    )
 }
 
 fn thermal_float(

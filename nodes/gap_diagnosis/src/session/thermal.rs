@@ -14,6 +14,9 @@
 //! less: two bodies that grow against each other show little of either, and the best thermometer alone is then none of the
 //! two. Nothing is chosen by its fit: a run (or a part of one log) is always predicted from the others.
 //!
+//! A thermometer that moved by less than [`moved::LEAST_MOVED`] times its own noise is not tried (`moved`), and no set with a size above
+//! [`MOST_UM_PER_K`]: the slow change of a room by 0.1 K has the shape of any warm-up.
+//!
 //! Sizes are of all runs; their standard errors are those of the jackknife over the runs \[3\], which neighbouring readings that
 //! share noise do not make too small.
 //!
@@ -39,6 +42,8 @@ use crate::noise::stack::Stack;
 use crate::report::figures::Note;
 use crate::search::rows::{Block, count, time_s};
 use crate::session::log;
+
+mod moved;
 
 /// One thermometer of (1).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,6 +84,8 @@ const MIN_SHARE_EXPLAINED: f64 = 0.5;
 const FIRST_LAG_MIN: f64 = 2.0;
 const LAG_STEP: f64 = 1.3;
 const TRIED_LAGS: i32 = 21;
+/// The largest shift of a tip that a machine has, µm/K.
+const MOST_UM_PER_K: f64 = 50.0;
 /// Factors by which a lag is refined.
 const REFINED: [f64; 3] = [1.12, 1.05, 1.02];
 
@@ -162,11 +169,12 @@ impl<'s> Search<'s> {
                 .collect()
         };
         let history = &stack.session.history;
-        let ids = history.temperature_degc.keys();
+        let read = history.temperature_degc.iter();
+        let moved = read.filter(|(_, degc)| moved::has_moved(degc));
         Some(Self {
             history,
-            warming_k: ids
-                .filter_map(|id| Some((id.as_str(), history.warming_k(id)?)))
+            warming_k: moved
+                .filter_map(|(id, _)| Some((id.as_str(), history.warming_k(id)?)))
                 .collect(),
             folds: most.iter().map(fold).collect(),
             columns: RefCell::default(),
@@ -294,7 +302,8 @@ impl<'s> Search<'s> {
         }
     }
 
-    /// (2) of some terms, and the sizes from all runs: of the offset, then of each; none where they are not determined.
+    /// (2) of some terms, and the sizes from all runs: of the offset, then of each; none where they are not determined, or one is
+    /// larger than a machine's.
     fn press(&self, terms: &[Term<'s>]) -> Option<(f64, DVector<f64>)> {
         let whole = self.summed(terms);
         let mut press = 0.0;
@@ -304,7 +313,8 @@ impl<'s> Search<'s> {
             press += fold.square - 2.0 * sizes.dot(&fold.along) + told;
         }
         let sizes = whole.gram.cholesky()?.solve(&whole.along);
-        press.is_finite().then_some((press, sizes))
+        let is_of_machine = sizes.iter().skip(1).all(|um| um.abs() <= MOST_UM_PER_K);
+        (press.is_finite() && is_of_machine).then_some((press, sizes))
     }
 
     /// Standard errors of the sizes by the jackknife, of the offset first; zeros where a run cannot be left out.
