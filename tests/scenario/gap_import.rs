@@ -108,8 +108,12 @@ fn a_ballbar_shows_squareness_and_backlash_with_their_sizes() {
     eprintln!("{said}");
     assert_eq!(report["inputs"]["bags"][0]["runs"], 6);
     assert_eq!(report["gap"]["above_floor"], true);
-    let [("backlash", "X", play_um), ("squareness", "XY", angle_urad)] = told(&report, "named")[..]
-    else {
+    // At one feed a play that grows with the feed looks the same.
+    let [("backlash", "X", play_um)] = told(&report, "set")[..] else {
+        panic!("{:#?}", causes(&report));
+    };
+    assert!(instead(&report, "backlash").contains(&"feed_lost_motion"));
+    let [("squareness", "XY", angle_urad)] = told(&report, "named")[..] else {
         panic!("{:#?}", causes(&report));
     };
     holds(play_um, 4.0, 0.6);
@@ -207,6 +211,22 @@ fn a_laser_shows_scale_and_backlash_with_their_sizes() {
     // One line cannot tell a scale of the axis, 1.1 um at the ends, from one of the laser.
     holds(scale_um_per_m, 4.0, 3.0);
     assert!(instead(&report, "scale_error").contains(&"length_wavelength"));
+}
+
+/// An angular error makes the same line where the axis has an Abbe offset: without a word on where the other axes stood it stays among
+/// what the line can be.
+#[test]
+fn an_angular_error_is_among_what_a_slope_can_be_where_nobody_states_the_other_axes() {
+    let home = TempDir::new().unwrap();
+    let map = home.path().join("laser.yaml");
+    let stated = std::fs::read_to_string(root("tests/import/positioning.yaml")).unwrap();
+    let lines = stated.lines().filter(|line| !line.starts_with("at_mm"));
+    std::fs::write(&map, lines.collect::<Vec<_>>().join("\n")).unwrap();
+    let (report, said) = diagnosed("tests/import/positioning.csv", &shown(&map), MACHINE);
+    assert!(
+        instead(&report, "scale_error").contains(&"angular_error"),
+        "{said}"
+    );
 }
 
 /// A laser's table: 12 um/m of scale, 5 um of backlash, 0.15 um between runs, 0.2 um of noise.
@@ -420,5 +440,77 @@ fn an_imported_laser_run_is_exported_by_its_means_up_and_down() {
         );
         assert!((from_first_mm - 1e-3 * f64::from(k)).abs() < 2e-6, "{text}");
         assert!((up_mm - down_mm - 5e-3).abs() < 2e-6, "{text}");
+    }
+}
+
+/// A laser's run of 400 mm on an axis that is 2 K too warm and has no error of its own: 11 µm/(m K) · 2 K · 0.4 m = 8.8 µm.
+fn warm_laser(home: &Path) -> PathBuf {
+    let (csv, map) = (home.join("laser.csv"), home.join("laser.yaml"));
+    let mut table = String::from("run,way,target,deviation\n");
+    for run in [1, 2] {
+        let up = (0..5).map(|k| ("+", k));
+        for (way, k) in up.chain((0..5).rev().map(|k| ("-", k))) {
+            let (at_mm, um) = (100 * k - 200, 2.2 * f64::from(k));
+            writeln!(table, "{run},{way},{at_mm},{um}").unwrap();
+        }
+    }
+    std::fs::write(&csv, table).unwrap();
+    std::fs::write(
+        &map,
+        "start_s: 1767600000\nat_mm: {Y: 0.0, Z: 120.0}\ntest:\n  positioning: {axis: X, feed_mm_min: 6000.0, dwell_s: 2.0, overrun_mm: 5.0, run: run, target_mm: target, deviation_um: deviation, direction: way}\n",
+    )
+    .unwrap();
+    imported(home, &shown(&csv), &shown(&map), MACHINE)
+}
+
+#[test]
+fn an_imported_laser_run_at_22_degc_is_exported_at_20_degc_by_a_budget_by_hand() {
+    let home = TempDir::new().unwrap();
+    let bag = warm_laser(home.path());
+    let budget = home.path().join("budget.yaml");
+    std::fs::write(
+        &budget,
+        "length_reference: {expanded_uncertainty_um: 0.1, expanded_uncertainty_um_per_m: 0.5, coverage_factor: 2.0}\nmachine: {temperature_deviation_k: 2.0, temperature_half_width_k: 0.2, expansion_um_per_m_k: 11.0, expansion_half_width_um_per_m_k: 1.0}\ndevice: {temperature_deviation_k: 0.0, temperature_half_width_k: 0.1, expansion_um_per_m_k: 0.0, expansion_half_width_um_per_m_k: 0.0}\nmisalignment_mm: 0.1\nenvironmental_drift_um: 0.0\n",
+    )
+    .unwrap();
+    let export = |more: &[&str], name: &str| {
+        let out = home.path().join(name);
+        let line = [
+            "export",
+            &shown(&bag),
+            "--format",
+            "linuxcnc",
+            "--spacing-mm",
+            "100",
+        ];
+        let folder = ["--out", &shown(&out)];
+        let ended = run(&[&line[..], &folder[..], more].concat());
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+        let read = |file: &str| std::fs::read_to_string(out.join(file)).unwrap();
+        (read("x.comp"), read("READ_ME_FIRST.txt"))
+    };
+    // Growth from the first point to the last one, going up, µm.
+    let grown_um = |text: &str| {
+        let error_mm = |row: usize| {
+            let line = text.lines().nth(row).unwrap();
+            let cells: Vec<f64> = line.split(' ').map(|cell| cell.parse().unwrap()).collect();
+            cells[1] - cells[0]
+        };
+        (error_mm(4) - error_mm(0)) * 1e3
+    };
+    let (as_read, notes) = export(&[], "as_read");
+    assert!((grown_um(&as_read) - 8.8).abs() < 3e-3, "{as_read}");
+    let words = "1 K changes 400 mm, the farthest target from the first, by 4.40 um";
+    assert!(as_read.contains(words) && notes.contains(words), "{notes}");
+    let (at_20, notes) = export(&["--budget", &shown(&budget)], "at_20");
+    assert!(grown_um(&at_20).abs() < 3e-3, "{at_20}");
+    for words in [
+        "machine 22.00 degC",
+        "0.00 um at -200 mm, -8.80 um at 200 mm",
+    ] {
+        assert!(
+            at_20.contains(words) && notes.contains(words),
+            "{words}: {notes}"
+        );
     }
 }

@@ -24,8 +24,8 @@ use crate::noise::unrepeated;
 use crate::noise::whiteness;
 use crate::noise::{self, Noise, Readings};
 use crate::report::figures::{Figures, Note};
-use crate::report::{DoesNotRepeat, GapReport, NoiseFloor, NotExcited, OverSession, SCHEMA};
-use crate::report::{localise, places};
+use crate::report::{DoesNotRepeat, GapReport, NotExcited, OverSession, SCHEMA};
+use crate::report::{floor, follows, localise, places};
 use crate::search::families::Slot;
 use crate::search::isolability;
 use crate::search::regression::Regression;
@@ -301,10 +301,12 @@ impl<'a> Base<'a> {
         let is_large = gap.rms_um >= LEAST_UNKNOWN * gap.floor_um;
         let flagged = (reproduced || is_large) && before.flagged() && (beside.flagged() || is_left);
         let effects = [found.entries(), scattered.entries()].concat();
-        let figures = figures(&stack, &slots, [&before, &beside], &found, &shrunk, config);
+        let mut figures = figures(&stack, &slots, [&before, &beside], &found, &shrunk, config);
+        figures.drifts = follows::drifts(&all, &found);
+        notes.extend(follows::shrinking(&stack, &found));
         let report = GapReport {
             schema: SCHEMA.to_owned(),
-            noise_floor: noise_floor(self.noise, &inflation, config),
+            noise_floor: floor::of(self, &inflation, config),
             gap,
             r#where: places::places(&stack, &slots, &before.families, &floated),
             causes: [found.causes(), scattered.causes].concat(),
@@ -314,6 +316,7 @@ impl<'a> Base<'a> {
             next_experiments: next.entries,
             over_session,
             does_not_repeat,
+            follows: follows::of(&found),
             ..GapReport::default()
         };
         Diagnosis {
@@ -432,6 +435,7 @@ fn figures(
         held_out: shrunk.held_out.clone(),
         apart: shrunk.apart.clone(),
         share_intervals: share_interval::of_places(stack, slots, before, config),
+        drifts: vec![],
     }
 }
 
@@ -548,22 +552,6 @@ fn notes(rows: &Rows, noise: &BTreeMap<Channel, Noise>) -> Vec<Note> {
         }
     }
     notes
-}
-
-fn noise_floor(
-    noise: &BTreeMap<Channel, Noise>,
-    inflation: &BTreeMap<Channel, f64>,
-    config: &GapConfig,
-) -> Vec<NoiseFloor> {
-    let of = |(channel, noise): (&Channel, &Noise)| NoiseFloor {
-        channel: channel.to_string(),
-        sigma_um: 1e3 * noise.reading_sigma_mm,
-        ar: noise.within.coefficients[noise.within.order()].clone(),
-        between_runs_um: Some(1e3 * noise.between.total_mm()),
-        repeats: noise.repeats,
-        reproduced: guard::reproduces(channel, inflation, config),
-    };
-    noise.iter().map(of).collect()
 }
 
 /// Kinds of which no instance could be seen.

@@ -4,7 +4,7 @@
 //! A session is what was commanded and read; `twin` says what should have been read. What is
 //! left is looked at against the noise that repeats show, and every question is answered with its doubt. `simulated` puts
 //! another simulator in the place of the twin's prediction.
-//! `report` is the answer, in the form that people's programs read; `figures` is what pages draw beside it.
+//! `report` is the answer, in the form that people's programs read; `figures` is what pages draw beside it, `follows` the thermometers of logs.
 //!
 //! `session` makes a session of recorded samples. `rows` thins readings to stations; `repeats` finds what was
 //! measured twice, `log` knows runs that stand and are read over time, `field`, `pace` and `noise` make the noise floor of it, `form_error`
@@ -18,7 +18,7 @@
 //! what is left is white. `families`, `localise` and `places` say where the gap lies, `guard` whether the
 //! noise is that of the repeats, `unknown` what no effect explains, `isolability` what could be told from what. `gap` is how much there was to explain, `split` and
 //! `shrink` how much of it goes on runs held out, with the intervals of `bootstrap`, `apart` what each effect has of that;
-//! `over_session` says whether one size holds over the session; `share_interval` is the interval of a place's share, `unread` the pauses of thermometers; `unrepeated` is the noise floor of a log made once, `thermal` finds the thermometers that a log goes with. `experiment` knows what could
+//! `over_session` says whether one size holds over the session; `share_interval` is the interval of a place's share, `unread` the pauses of thermometers; `vibration` what of the noise is a line of its spectrum; `unrepeated` is the noise floor of a log made once, `thermal` finds the thermometers that a log goes with. `experiment` knows what could
 //! be measured next and `next` which of it would decide. `diagnose` puts the questions in their order,
 //! `preflight` some of them before anything is measured, and `design` chooses what to measure; `regression` is what other methods than these would start
 //! from, `problem` the first search as numbers alone, `rule` what of these can be switched off. `stage` is the node's whole computation, `following` its

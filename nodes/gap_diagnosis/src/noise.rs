@@ -34,6 +34,7 @@ pub(crate) mod pace;
 pub(crate) mod repeats;
 pub(crate) mod stack;
 pub(crate) mod unrepeated;
+pub(crate) mod vibration;
 pub(crate) mod whitener;
 pub(crate) mod whiteness;
 

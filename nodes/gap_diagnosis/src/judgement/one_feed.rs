@@ -28,7 +28,7 @@
 //! it reads as a play that wears along the axis, with which it is listed.
 //!
 //! # Holds when
-//! Feeds are steady between the turns. Runs at rest have no feed and are left out.
+//! Feeds are steady between the turns. Of readings at rest (1) takes the feed at which the axis came there, (2) zero.
 
 use metrology::Axis;
 use twin::Motion;
@@ -88,7 +88,9 @@ pub(crate) fn list(stack: &Stack<'_>, signatures: &Library, members: &mut [Membe
 
 /// (1).
 fn is_of_one_feed(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> bool {
-    let feeds = feeds_mm_s(stack, instance, values);
+    // Where an axis stands while it is read the whole run says how it came there.
+    let came = |motion: &Motion| feed_mm_s(motion, 0..motion.time_s.len());
+    let feeds = feeds_mm_s(stack, instance, values, came);
     feeds.is_some_and(|[slowest, fastest]| fastest <= ONE_FEED * slowest)
 }
 
@@ -96,7 +98,7 @@ fn is_of_one_feed(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> boo
 fn is_gone_between_turns(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> bool {
     let mut parameters = instance.kind.parameters.iter().zip(values);
     let speed = parameters.find_map(|(own, value)| (own.name == SPEED).then_some(*value));
-    let feeds = feeds_mm_s(stack, instance, values);
+    let feeds = feeds_mm_s(stack, instance, values, |_| Some(0.0));
     let is_gone = |([slowest, _], speed): ([f64; 2], f64)| (-slowest / speed).exp() < GONE;
     feeds.zip(speed).is_some_and(is_gone)
 }
@@ -118,8 +120,13 @@ fn cosine_of_play(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> Opt
     (cos >= MIN_COSINE_OF_PLAY).then_some(cos)
 }
 
-/// Slowest and fastest feed of the runs that show an effect; `None` where no run moves.
-fn feeds_mm_s(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> Option<[f64; 2]> {
+/// Slowest and fastest feed of the runs that show an effect, `at_rest` of those that are read where their axes stand.
+fn feeds_mm_s(
+    stack: &Stack<'_>,
+    instance: &Instance,
+    values: &[f64],
+    at_rest: impl Fn(&Motion) -> Option<f64>,
+) -> Option<[f64; 2]> {
     let signature = stack.signature(&*instance.effect(values));
     let blocks = stack.rows.blocks.iter().filter(|block| {
         let rows = signature.rows(block.start, block.rows.len());
@@ -128,8 +135,7 @@ fn feeds_mm_s(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> Option<
     let feeds = blocks.filter_map(|block| {
         let motion = &stack.session.runs[block.run].motion;
         let read = block.rows.iter().filter_map(|row| row.tick);
-        // Where an axis stands while it is read the whole run says how it came there.
-        feed_mm_s(motion, read).or_else(|| feed_mm_s(motion, 0..motion.time_s.len()))
+        feed_mm_s(motion, read).or_else(|| at_rest(motion))
     });
     feeds.fold(None, |range, feed| {
         let [low, high] = range.unwrap_or([feed, feed]);

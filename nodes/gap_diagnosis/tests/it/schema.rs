@@ -10,7 +10,9 @@ const TEXT: &str = include_str!("../../schema/abbe.gap.1.schema.json");
 const FULL: &str = r#"{
 "schema": "abbe.gap/1",
 "inputs": {"bags": [{"path": "", "sha256": "", "runs": 0, "samples": 0}], "machine_sha256": ""},
-"noise_floor": [{"channel": "grid.u", "sigma_um": 0.2, "ar": [0.6], "repeats": 3, "reproduced": true}],
+"noise_floor": [{"channel": "grid.u", "sigma_um": 0.2, "ar": [0.6], "repeats": 3, "reproduced": true,
+  "vibrations": [{"frequency_hz": 47.3, "frequency_half_width_hz": 0.2, "rms_um": 0.21, "runs": 12, "of": 12, "sampled_hz": 250.0,
+    "period_mm": 0.35, "chance": 1e-9}]}],
 "gap": {"rms_um": 8.1, "p95_um": 14.0, "floor_um": 0.3, "above_floor": true,
   "per_channel": [{"channel": "grid.u", "rms_um": 8.1, "p95_um": 14.0, "floor_um": 0.3, "above_floor": true}]},
 "where": [{"channel": "grid.u", "direction": "X", "covariate": "", "share_unique": 0.6, "share_shared": 0.1, "p_value": 0.001,
@@ -31,6 +33,8 @@ const FULL: &str = r#"{
   "growth_share_per_h": 0.1, "chance": 0.001}],
 "does_not_repeat": [{"channel": "radial", "size_um": 5.0, "last_run": 3, "from_run": 4, "of_set_up": true,
   "evenly": true, "chance": 1e-6}],
+"follows": [{"channel": "length.Z", "share": 0.97,
+  "thermometers": [{"thermometer": "spindle_front", "um_per_k": 3.0, "standard_error_um_per_k": 0.02, "lag_min": 12.0}]}],
 "runtime_s": 1.3 }"#;
 
 /// What `abbe diagnose` adds to a report, where there is any.
@@ -63,9 +67,11 @@ const SAMPLE: &str = r#"{ "schema": "abbe.gap/1",
   "runtime_s": 1.3 }"#;
 
 /// Keys that a report need not have, with their place.
-const OPTIONAL: [(&str, &str); 9] = [
+const OPTIONAL: [(&str, &str); 11] = [
     ("report", "over_session"),
     ("report", "does_not_repeat"),
+    ("report", "follows"),
+    ("report.noise_floor[]", "vibrations"),
     ("report", "loss"),
     ("report", "machine_defaults"),
     ("report", "simulated"),

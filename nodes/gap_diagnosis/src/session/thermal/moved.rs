@@ -80,7 +80,9 @@ mod tests {
 
     #[test]
     fn a_step_of_the_resolution_is_no_movement() {
-        let flicker: Vec<f64> = (0..400).map(|k| 21.0 + 0.1 * f64::from(k / 7 % 2)).collect();
+        let flicker: Vec<f64> = (0..400)
+            .map(|k| 21.0 + 0.1 * f64::from(k / 7 % 2))
+            .collect();
         assert!(!has_moved(&flicker));
         assert!(!has_moved(&[21.0; 50]));
         let rise: Vec<f64> = (0..400).map(|k| 21.0 + 0.1 * f64::from(k / 20)).collect();
