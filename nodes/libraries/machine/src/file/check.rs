@@ -15,6 +15,10 @@ use crate::error::MachineFileError;
 
 /// Nearer corners are those of one block, mm.
 const SAME_CORNER_MM: f64 = 1.0;
+const BALL_RADII: &str =
+    "must be from 0.02 to 30 mm, the radii of styli: state it in mm, not in m or µm";
+const STYLUS_LENGTHS: &str =
+    "must be from 1 to 3000 mm, the lengths of styli: state it in mm, not in m or µm";
 const FINITE: &str = "must be a finite number";
 /// Magnitude of any number of the file, in the unit of its key: products of a few of them stay finite.
 const GREATEST_NUMBER: f64 = 1e12;
@@ -275,10 +279,31 @@ impl Check<'_> {
         for name in probe.styli.keys() {
             self.ros_name(&format!("probe.styli.{name}"), name)?;
         }
+        self.sizes(&probe.styli)?;
         self.stems(&probe.styli)?;
         let known = probe.styli.contains_key(&probe.mounted);
         let rule = "must be one of probe.styli";
         self.name("probe.mounted", &probe.mounted, known, rule)
+    }
+
+    /// Refuses sizes that no stylus has: a slip of m or µm.
+    fn sizes(&self, styli: &BTreeMap<String, StylusEntry>) -> Result<(), MachineFileError> {
+        for (name, stylus) in styli {
+            let lengths = [
+                ("length_mm", Some(stylus.length_mm)),
+                ("stem_length_mm", stylus.stem_length_mm),
+            ];
+            let lengths =
+                lengths.map(|(key, mm)| (key, mm, limits::STYLUS_LENGTH_MM, STYLUS_LENGTHS));
+            let radius_mm = Some(stylus.radius_mm);
+            let radius = ("radius_mm", radius_mm, limits::BALL_RADIUS_MM, BALL_RADII);
+            for (key, mm, range, rule) in [radius].into_iter().chain(lengths) {
+                let Some(mm) = mm else { continue };
+                let key = format!("probe.styli.{name}.{key}");
+                self.number(&key, mm, range.contains(&mm), rule)?;
+            }
+        }
+        Ok(())
     }
 
     /// Stems are compared with one another, so each stylus states its own or none does.

@@ -11,12 +11,19 @@ const FINEST_UM: f64 = 1e-6;
 /// inverse square, which would overflow for far less.
 pub const REPEATABILITY_UM: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 
+/// Lead of a screw, or way of a rack for a turn of its motor: from watch parts to gantries of 30 m. A slip of m or µm lies outside.
+const LEAD_MM: std::ops::RangeInclusive<f64> = 0.2..=500.0;
+/// Radius of a ball that touches: from micro styli and nozzles to probes of large castings.
+pub(super) const BALL_RADIUS_MM: std::ops::RangeInclusive<f64> = 0.02..=30.0;
+/// Length of a stylus, from its seat and from the spindle nose.
+pub(super) const STYLUS_LENGTH_MM: std::ops::RangeInclusive<f64> = 1.0..=3000.0;
+
 /// One row for each key; a key has one meaning in the whole file.
 pub(super) const ROWS: &[Row] = &[
     ("travel_mm", -HALL_MM, HALL_MM),
     ("feed_limit_mm_min", 0.1, 1e7),
     ("acceleration_limit_mm_s2", 0.1, 1e6),
-    ("lead_mm", 0.01, 1e4),
+    ("lead_mm", *LEAD_MM.start(), *LEAD_MM.end()),
     ("position_gain_per_s", 0.1, 1e5),
     ("velocity_feedforward", 0.0, 1.0),
     ("frequency_hz", 0.1, 1e5),

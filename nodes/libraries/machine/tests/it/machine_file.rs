@@ -315,6 +315,16 @@ fn numbers_and_lists_beyond_their_bounds_are_refused_by_key_value_and_bound() {
             "repeatability_um: 1.0e13",
             "probe.repeatability_um = 10000000000000 µm: must be from 0.001 to 1000 µm",
         ),
+        (
+            "lead_mm: 10.0",
+            "lead_mm: 0.01",
+            "axes.X.lead_mm = 0.01 mm: must be from 0.2 to 500 mm",
+        ),
+        (
+            "lead_mm: 10.0",
+            "lead_mm: 10000.0",
+            "axes.X.lead_mm = 10000 mm: must be from 0.2 to 500 mm",
+        ),
     ] {
         let said = refusal(from, to);
         assert!(said.contains(words), "{said}");
@@ -433,6 +443,38 @@ fn file_takes_zero(place: &str) -> bool {
             .iter()
             .chain(&from_zero)
             .any(|key| place.contains(key))
+}
+
+#[test]
+fn styli_of_a_size_in_metres_or_micrometres_are_refused_with_the_remedy() {
+    let with = |change: fn(&mut machine::file::StylusEntry)| {
+        let mut file = MachineFile::parse(BENCH, "m.yaml").unwrap();
+        let stylus = file.probe.styli.values_mut().next().unwrap();
+        change(stylus);
+        file.check("m.yaml").unwrap_err().to_string()
+    };
+    for (said, words) in [
+        (
+            with(|it| it.radius_mm = 0.003),
+            "radius_mm = 0.003 mm: must be from 0.02 to 30 mm",
+        ),
+        (
+            with(|it| it.radius_mm = 3000.0),
+            "radius_mm = 3000 mm: must be from 0.02 to 30 mm",
+        ),
+        (
+            with(|it| it.length_mm = 0.15),
+            "length_mm = 0.15 mm: must be from 1 to 3000 mm",
+        ),
+        (
+            with(|it| it.stem_length_mm = Some(0.05)),
+            "stem_length_mm = 0.05 mm: must be from 1 to 3000 mm",
+        ),
+    ] {
+        assert!(said.starts_with("m.yaml: probe.styli."), "{said}");
+        assert!(said.contains(words), "{said}");
+        assert!(said.ends_with("state it in mm, not in m or µm"), "{said}");
+    }
 }
 
 #[test]
