@@ -219,7 +219,7 @@ fn a_laser_shows_scale_and_backlash_with_their_sizes() {
 fn an_angular_error_is_among_what_a_slope_can_be_where_nobody_states_the_other_axes() {
     let home = TempDir::new().unwrap();
     let map = home.path().join("laser.yaml");
-    let stated = std::fs::read_to_string(root("tests/import/positioning.yaml")).unwrap();
+    let stated = std::fs::read_to_string(root().join("tests/import/positioning.yaml")).unwrap();
     let lines = stated.lines().filter(|line| !line.starts_with("at_mm"));
     std::fs::write(&map, lines.collect::<Vec<_>>().join("\n")).unwrap();
     let (report, said) = diagnosed("tests/import/positioning.csv", &shown(&map), MACHINE);
