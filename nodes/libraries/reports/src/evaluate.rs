@@ -30,6 +30,7 @@ pub mod stationwise;
 pub mod stops;
 mod strays;
 pub mod test_conditions;
+pub mod thermometer;
 
 use crate::machine_defaults;
 use crate::machine_of_bag;

@@ -15,6 +15,7 @@ use metrology::sample::TestKind;
 mod change;
 mod curves;
 mod diagonals;
+mod one_value;
 mod single;
 #[cfg(test)]
 mod tests;
@@ -28,6 +29,7 @@ use crate::evaluate::Tests;
 use crate::evaluate::budget::{Budget, unstate, unstate_named};
 use crate::evaluate::correction::{About, BY_OWN_SCALE, Measured};
 use crate::evaluate::linear::{LinearTest, Reference, STOP_SETTLE, level};
+use crate::evaluate::thermometer::name_dead;
 
 /// A figure and, where a budget was given, its expanded uncertainty.
 pub fn figure(value: &ExpandedLength, stated: bool) -> String {
@@ -60,15 +62,7 @@ pub fn sections(tests: &Tests, budget: Option<&Budget>) -> Result<Vec<Section>> 
 
 /// The runs at 20 °C, where they are corrected here.
 fn runs(test: &LinearTest, periods_mm: Vec<f64>, measured: &Measured) -> PositioningRuns {
-    let as_read = PositioningRuns {
-        targets_mm: test.targets_mm.clone(),
-        up_mm: test.up_mm.clone(),
-        down_mm: test.down_mm.clone(),
-        zero_mm: test.targets_mm.first().copied().unwrap_or(0.0),
-        periods_mm,
-    };
-    let expansion = measured.correction.differential_expansion();
-    let mut runs = as_read.corrected_to_20_degc(expansion);
+    let mut runs = measured.correction.runs_at_20_degc(test, periods_mm);
     level(&mut runs.up_mm, &mut runs.down_mm);
     runs
 }
@@ -158,6 +152,8 @@ fn section(tests: &Tests, test: &LinearTest, budget: Option<&Budget>) -> Result<
         section.title = title(&diagonals::shown_name(test));
     }
     section.name_far(&test.outlying.far);
+    one_value::name(&mut section, test);
+    name_dead(&mut section, &tests.conditions.during(&test.runs));
     Ok(section)
 }
 

@@ -117,6 +117,11 @@ pub fn of(seen: &TestConditions, budget: Option<&Budget>, tests: Option<&Tests>)
             note: "From the first test to the last one.".to_owned(),
         });
     }
+    for (name, dead) in seen.dead() {
+        let words = format!("Dead instrument: {}.", dead.in_words(name));
+        section.lines.push(words.clone());
+        short.push(words);
+    }
     match drawing(seen) {
         Ok(drawn) => section.drawings.extend(drawn),
         Err(error) => section

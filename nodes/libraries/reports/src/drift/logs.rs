@@ -11,6 +11,7 @@ use super::{HOUR_S, in_words, show_temperatures, slips, temperatures};
 use crate::evaluate::budget::{Budget, MandrelGrowth};
 use crate::evaluate::drift::{Drift, DriftLog};
 use crate::evaluate::test_conditions::Thermometers;
+use crate::evaluate::thermometer::name_dead;
 use crate::plot::{self, Plot, Trace};
 use crate::section::{Drawing, Rows, Section, head, um};
 
@@ -47,6 +48,7 @@ pub(super) fn section(
     let mandrel = mandrel_of(log.axis, (budget, during), &mut section);
     let found = evaluated(log, &values, (budget, mandrel));
     section.name_far(&slips::far(&values));
+    name_dead(&mut section, during);
     let beside = temperatures(drift, *from, *to);
     let figures = match found {
         Ok(found) => {

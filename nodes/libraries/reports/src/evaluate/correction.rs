@@ -2,6 +2,7 @@
 
 use iso230::budget::{DeviceUncertainty, differential_expansion};
 use iso230::circular::CircularBudget;
+use iso230::positioning::PositioningRuns;
 use iso230::positioning::budget::PositioningBudget;
 use machine::MachineFile;
 use machine::file::PositionFeedback;
@@ -332,6 +333,19 @@ impl Correction {
             } => *differential_expansion,
             Self::ByInstrument | Self::Missing { .. } => 0.0,
         }
+    }
+
+    /// The runs of a test along one line, at 20 °C where they are corrected here; 0 is taken out at the first target.
+    #[must_use]
+    pub fn runs_at_20_degc(&self, test: &LinearTest, periods_mm: Vec<f64>) -> PositioningRuns {
+        let as_read = PositioningRuns {
+            targets_mm: test.targets_mm.clone(),
+            up_mm: test.up_mm.clone(),
+            down_mm: test.down_mm.clone(),
+            zero_mm: test.targets_mm.first().copied().unwrap_or(0.0),
+            periods_mm,
+        };
+        as_read.corrected_to_20_degc(self.differential_expansion())
     }
 
     /// Why no conformance is decided; none: the lengths are those at 20 °C.

@@ -11,6 +11,7 @@ use replayer::{Taken, reading};
 
 use super::course::Course;
 use super::imported::Imported;
+use super::thermometer::{Dead, Watch};
 
 /// Age of the last reading before a test that still counts for it: thermometers are read every few seconds to minutes.
 const LONGEST_AGE: Span = Span::from_nanos(600_000_000_000);
@@ -43,6 +44,8 @@ pub struct Readings {
     pub greatest_degc: f64,
     /// How many.
     pub n: u32,
+    /// What it shows since it stopped to measure, where that is among them.
+    pub dead: Option<Dead>,
     sum_degc: f64,
 }
 
@@ -59,6 +62,7 @@ impl Readings {
             least_degc: degc,
             greatest_degc: degc,
             n: 1,
+            dead: None,
             sum_degc: degc,
         }
     }
@@ -75,6 +79,12 @@ impl Readings {
         self.greatest_degc = self.greatest_degc.max(later.greatest_degc);
         self.n = self.n.saturating_add(later.n);
         self.sum_degc += later.sum_degc;
+    }
+
+    /// Whether this is the least or the greatest reading.
+    fn has(&self, degc: f64) -> bool {
+        let ends = [self.least_degc, self.greatest_degc];
+        ends.iter().any(|end| end.total_cmp(&degc).is_eq())
     }
 
     /// Mean, °C.
@@ -123,6 +133,7 @@ pub struct TestConditions {
     /// Readings of each thermometer over the whole bag, °C.
     pub courses: BTreeMap<String, Course<f64>>,
     tests: Vec<Test>,
+    watches: BTreeMap<String, Watch>,
     latest: BTreeMap<String, (Stamp<Host>, f64)>,
     under_way: Option<TestSegment>,
     /// Production that has ended, s.
@@ -217,6 +228,7 @@ impl TestConditions {
         self.latest.insert(name.clone(), (sample.at, degc));
         let course = self.courses.entry(name.clone()).or_default();
         course.add(sample.at, degc);
+        self.watches.entry(name.clone()).or_default().add(degc);
         if self.between.is_some() {
             add(&mut self.thermometers, name, degc);
         }
@@ -294,6 +306,12 @@ impl TestConditions {
         self.under_way = Some(segment.clone());
     }
 
+    /// Thermometers that stopped to measure.
+    pub fn dead(&self) -> impl Iterator<Item = (&String, Dead)> {
+        let watches = self.watches.iter();
+        watches.filter_map(|(name, watch)| Some((name, watch.dead()?)))
+    }
+
     /// What the thermometers read during tests, by the numbers of their runs.
     #[must_use]
     pub fn during(&self, runs: &[u32]) -> Thermometers {
@@ -306,6 +324,11 @@ impl TestConditions {
                         joined.insert(name.clone(), *readings);
                     }
                 }
+            }
+        }
+        for (name, dead) in self.dead() {
+            if let Some(readings) = joined.get_mut(name) {
+                readings.dead = Some(dead).filter(|dead| readings.has(dead.degc));
             }
         }
         joined
@@ -463,9 +486,17 @@ mod tests {
         assert_eq!((all.first_degc, all.last_degc, all.n), (21.0, 25.0, 4));
         assert!((conditions.production_before_s - 600.0).abs() < 1e-9);
         assert_eq!(conditions.production_before_later, []);
+        for s in 0..6 {
+            conditions.read(&reading(2_020 + s, 0.0));
+        }
+        conditions.segment(&segment(2_030, 4, true, TestKind::Positioning));
+        conditions.segment(&segment(2_040, 4, false, TestKind::Positioning));
+        assert_eq!(conditions.during(&[2])["bed"].dead, None);
+        let dead = conditions.during(&[2, 4])["bed"].dead.unwrap();
+        assert_eq!((dead.before_degc, dead.degc, dead.n), (Some(25.0), 0.0, 6));
         assert_eq!(conditions.feeds_mm_s, [100.0]);
         let (first, last) = conditions.between.unwrap();
-        assert_eq!(last - first, Span::from_nanos(1_395_000_000_000));
+        assert_eq!(last - first, Span::from_nanos(1_425_000_000_000));
     }
 
     #[test]
