@@ -10,7 +10,7 @@ mod round;
 
 pub use lack_of_fit::{PureError, chi_square_p, f_test_p, lack_of_fit};
 pub use line::{LineFit, fit_line};
-pub use plane::{PlaneFit, fit_plane};
+pub use plane::{PlaneFit, fit_plane, plane_basis};
 pub use round::{CircleFit, RoundFit, SphereFit, fit_round};
 
 use crate::least_squares::FitError;

@@ -105,6 +105,14 @@ pub fn fit_plane(
     })
 }
 
+/// Two directions that with a normal make a right-handed frame; of the normal Z they are X and Y.
+#[must_use]
+pub fn plane_basis(normal: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let first = Vector3::ith((normal.iamax() + 1) % 3, 1.0);
+    let across = (first - normal * first.dot(normal)).normalize();
+    [across, normal.cross(&across)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
