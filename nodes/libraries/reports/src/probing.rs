@@ -10,17 +10,27 @@ use crate::evaluate::Tests;
 use crate::evaluate::budget::Budget;
 
 mod errors;
+mod lists;
 mod location;
 mod repeatability;
+mod slips;
 
 /// The parts that the bag has something for.
 pub fn sections(tests: &Tests, budget: Option<&Budget>) -> Vec<Section> {
     let mut sections = Vec::new();
-    sections.extend(repeatability::section(&tests.touches, budget));
-    sections.extend(shapes(&tests.features));
+    sections.extend(repeatability::section(tests, budget));
+    sections.extend(match is_list(tests) {
+        true => lists::shapes(&tests.features),
+        false => shapes(&tests.features),
+    });
     sections.extend(errors::section(tests, budget));
     sections.extend(location::section(tests, budget));
     sections
+}
+
+/// Whether touches are those of a table: positions of the ball's centre, with pretravel.
+fn is_list(tests: &Tests) -> bool {
+    tests.conditions.imported.is_some()
 }
 
 /// Range of a reading with everything at rest, by the budget, mm.

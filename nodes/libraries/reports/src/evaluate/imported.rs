@@ -30,6 +30,8 @@ pub struct Imported {
     feed_mm_min: Option<f64>,
     feed_deg_min: Option<f64>,
     dwell_s: Option<f64>,
+    /// Stands where a list of touches has no times.
+    touch_times: Option<String>,
     /// Keys whose value the program assumed.
     assumed: Vec<String>,
 }
@@ -47,7 +49,7 @@ impl Imported {
     /// Whether the times in the bag are those of a motion that nobody recorded.
     #[must_use]
     pub const fn is_motion_made_up(&self) -> bool {
-        self.feed_mm_min.is_some() || self.feed_deg_min.is_some()
+        self.feed_mm_min.is_some() || self.feed_deg_min.is_some() || self.touch_times.is_some()
     }
 
     /// When the measurement began, ns since 1970.

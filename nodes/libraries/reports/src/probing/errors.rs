@@ -5,14 +5,15 @@ use iso230::budget::DeviceUncertainty;
 use iso230::probing::{self, Artefact, FormResult, RING_POINTS, SPHERE_POINTS, Side};
 use machine::cycle::FeatureId;
 use machine::file::CertificateEntry;
-use metrology::number::number;
+use metrology::fit::plane_basis;
 use metrology::sample::{FeatureKind, ProbedFeature, ProbedPoint, Rejection};
 use metrology::stamp::{Host, Stamp};
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
 use serde_json::json;
 
-use super::{drift_mm, kind, pose};
+use super::slips::{far, slip};
+use super::{drift_mm, is_list, kind, pose};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::Budget;
 use crate::evaluate::correction::{About, Measured};
@@ -46,12 +47,8 @@ struct Found {
     far: Option<String>,
 }
 
-/// Greatest form error of a shape that was touched, mm: beyond it a touch is of something else, or was latched wrongly.
-const GREATEST_FORM_MM: f64 = 0.5;
-/// A touch is far from the others that makes the form error this many times as great.
-const FAR_FORMS: f64 = 10.0;
-/// None is far where the form error is smaller, mm.
-const LEAST_FAR_FORM_MM: f64 = 0.01;
+/// A ring whose axis (a unit vector) is nearer to Z is evaluated in X and Y: its radii differ by less than 1e-4 of themselves.
+const LEAST_TILT: f64 = 1e-2;
 
 /// The part, where a round shape was touched.
 pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section> {
@@ -71,10 +68,14 @@ pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section>
     }
     (!found.is_empty()).then(|| {
         let mut section = Section::new("Probing errors of form and size, ISO 230-10");
-        for answer in answers(&found, budget.is_some()) {
+        let all = match is_list(tests) {
+            true => answers_of_list(&found),
+            false => answers(&found, budget.is_some()),
+        };
+        for answer in all {
             section.answer(answer);
         }
-        for (is_warning, line) in reasons(&found, tests.machine.is_some()) {
+        for (is_warning, line) in reasons(&found, tests) {
             if is_warning {
                 section.warn(NOT_EVALUATED, line);
             } else {
@@ -148,8 +149,42 @@ fn answers(found: &[Found], stated: bool) -> Vec<String> {
     greatest.into_iter().map(in_words).collect()
 }
 
+/// The greatest probing error of each artefact of a list, however often it was touched.
+fn answers_of_list(found: &[Found]) -> Vec<String> {
+    let mut greatest: Vec<&Found> = vec![];
+    for one in found.iter().filter(|one| one.not_evaluated.is_none()) {
+        let known = greatest
+            .iter_mut()
+            .find(|known| known.feature == one.feature);
+        match known {
+            Some(known) if known.probing_error_mm < one.probing_error_mm => *known = one,
+            Some(_) => {}
+            None => greatest.push(one),
+        }
+    }
+    let in_words = |one: &&Found| {
+        let name = if one.kind == "sphere" {
+            "P_FTU,3D"
+        } else {
+            "P_FTU,2D"
+        };
+        let asked = match one.points == one.usual_points {
+            true => String::new(),
+            false => format!("; ISO 230-10 asks for {}", one.usual_points),
+        };
+        format!(
+            "{name} {} µm, of {} points on {}, run {}{asked}.",
+            um(one.probing_error_mm),
+            one.points,
+            one.feature,
+            one.run
+        )
+    };
+    greatest.iter().map(in_words).collect()
+}
+
 /// What has no figure, each reason once, with whether the whole test has none.
-fn reasons(found: &[Found], has_machine: bool) -> Vec<(bool, String)> {
+fn reasons(found: &[Found], tests: &Tests) -> Vec<(bool, String)> {
     let mut lines: Vec<(bool, String)> = vec![];
     let mut add = |is_warning: bool, line: String| {
         if !lines.iter().any(|(_, known)| *known == line) {
@@ -163,8 +198,10 @@ fn reasons(found: &[Found], has_machine: bool) -> Vec<(bool, String)> {
                 format!("{}, run {}: not evaluated: {why}.", one.feature, one.run),
             ),
             None if one.certificate.is_none() => {
-                let where_missing = if has_machine {
+                let where_missing = if tests.machine.is_some() {
                     "the machine file has no certificate of it (certificates)"
+                } else if is_list(tests) {
+                    "a list has no certificate of it"
                 } else {
                     "the bag has no machine file, which would have its certificate"
                 };
@@ -262,7 +299,7 @@ fn evaluated(
         if is_sphere {
             return probing::sphere(points, &artefact, drift_mm);
         }
-        let flat: Vec<_> = points.iter().map(Vector3::xy).collect();
+        let flat: Vec<_> = points.iter().map(|point| flat(point, feature)).collect();
         probing::ring(&flat, &artefact, drift_mm)
     };
     let form_mm = |points: &[Vector3<f64>]| of(points).ok().map(|one| one.form_error.value_mm);
@@ -300,70 +337,14 @@ fn evaluated(
     }
 }
 
-/// The touch without which the others are nearest to a shape, and their form error then, mm.
-fn farthest(
-    points: &[Vector3<f64>],
-    form_mm: impl Fn(&[Vector3<f64>]) -> Option<f64>,
-) -> Option<(usize, f64)> {
-    let without = |out: usize| {
-        let mut others = points.to_vec();
-        others.remove(out);
-        Some((out, form_mm(&others)?))
-    };
-    let nearest = (0..points.len()).filter_map(without);
-    nearest.min_by(|a, b| a.1.total_cmp(&b.1))
-}
-
-/// The touch of a shape that is far from the others, in words; `None` also with too few touches.
-fn far(
-    points: &[Vector3<f64>],
-    n_unknowns: usize,
-    form_mm: impl Fn(&[Vector3<f64>]) -> Option<f64>,
-) -> Option<String> {
-    let found_mm = form_mm(points).filter(|mm| *mm > LEAST_FAR_FORM_MM)?;
-    if points.len() < n_unknowns + 3 {
-        return None;
+/// A point in the plane of a ring; without a normal of its own that of X and Y.
+fn flat(point: &Vector3<f64>, feature: &ProbedFeature) -> Vector2<f64> {
+    let tilt = feature.normal.xy().norm();
+    if tilt <= LEAST_TILT || feature.normal.norm() < 0.5 {
+        return point.xy();
     }
-    let (place, left_mm) = farthest(points, &form_mm)?;
-    (found_mm > FAR_FORMS * left_mm).then(|| {
-        format!(
-            "touch {} of {} makes the form error {} µm, which is {} µm without it. It is in every figure; repeat the measurement where it is a slip",
-            place + 1,
-            points.len(),
-            um(found_mm),
-            um(left_mm)
-        )
-    })
-}
-
-/// Why touches are not those of one shape: the one without which the others are nearest to it.
-fn slip(
-    points: &[Vector3<f64>],
-    n_unknowns: usize,
-    form_mm: impl Fn(&[Vector3<f64>]) -> Option<f64>,
-) -> Option<String> {
-    let found_mm = form_mm(points).filter(|mm| *mm > GREATEST_FORM_MM)?;
-    let greatest = um(GREATEST_FORM_MM);
-    if points.len() < n_unknowns + 3 {
-        // Without any of so few the others fit nearly as well.
-        return Some(format!(
-            "form error of {} µm, at most {greatest} µm: one of its {} touches is of something else: repeat the measurement",
-            um(found_mm),
-            points.len()
-        ));
-    }
-    let (place, left_mm) = farthest(points, &form_mm)?;
-    let at = points[place].iter().map(|mm| number(*mm));
-    Some(format!(
-        "form error of {} µm, at most {} µm: touch {} of {}, at ({}) mm, is the farthest from the others, which have {} µm without it: \
-         repeat the measurement",
-        um(found_mm),
-        greatest,
-        place + 1,
-        points.len(),
-        at.collect::<Vec<_>>().join(", "),
-        um(left_mm)
-    ))
+    let [across, along] = plane_basis(&feature.normal);
+    Vector2::new(point.dot(&across), point.dot(&along))
 }
 
 impl Found {

@@ -12,9 +12,10 @@ use metrology::sample::{FeatureKind, ProbedFeature, TestSegment};
 use serde::Serialize;
 use serde_json::json;
 
-use super::{drift_mm, kind, pose};
+use super::{drift_mm, is_list, kind, pose};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::Budget;
+use crate::evaluate::imported::Imported;
 use crate::positioning::figure;
 use crate::section::{Rows, Section, head, um};
 
@@ -29,20 +30,32 @@ struct Repeats {
     kind: &'static str,
     pose: String,
     measurements: usize,
-    hours: f64,
-    /// R in X, Y and, of a sphere, Z.
+    /// None where nobody stated times.
+    hours: Option<f64>,
+    /// R in X, Y and, of a sphere, Z; of a ring in another plane along its axes.
     repeatability: Vec<ExpandedLength>,
+    /// Along which axes, in their order.
+    axes: Vec<Axis>,
 }
 
 /// The part, where a feature was measured twice.
 pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section> {
     let drift_mm = drift_mm(budget);
+    let imported = tests.conditions.imported.as_ref();
+    let is_made_up = imported.is_some_and(Imported::is_motion_made_up);
     let found: Vec<Repeats> = groups(tests)
         .iter()
         .filter_map(|group| Repeats::of(group, drift_mm))
+        .map(|found| Repeats {
+            hours: found.hours.filter(|_| !is_made_up),
+            ..found
+        })
         .collect();
     (!found.is_empty()).then(|| {
         let mut section = Section::new("Repeatability of location, ISO 230-10");
+        if is_list(tests) {
+            found.iter().for_each(|one| section.answer(one.answer()));
+        }
         section.tables.push(Rows {
             head: head(&[
                 "feature",
@@ -111,15 +124,32 @@ fn stands_alike(a: &ProbedFeature, b: &ProbedFeature) -> bool {
     Axis::ROTARY.iter().all(near)
 }
 
+/// Axes along which the centre of a shape is found: of a ring those of its plane.
+fn axes(feature: &ProbedFeature) -> Vec<Axis> {
+    let normal = feature.normal.iamax();
+    let is_tilted = feature.normal[normal].abs() > feature.normal.z.abs();
+    let out = match feature.kind {
+        FeatureKind::Sphere | FeatureKind::Plane => None,
+        FeatureKind::Bore | FeatureKind::Boss if is_tilted => Some(normal),
+        FeatureKind::Bore | FeatureKind::Boss => Some(Axis::Z.index()),
+    };
+    let linear = Axis::LINEAR.into_iter();
+    linear.filter(|axis| Some(axis.index()) != out).collect()
+}
+
 impl Repeats {
     fn of(group: &[&ProbedFeature], drift_mm: f64) -> Option<Self> {
         let (first, last) = (group.first()?, group.last()?);
         let centres: Vec<_> = group.iter().map(|feature| feature.centre_mm).collect();
-        let result = if first.kind == FeatureKind::Sphere {
-            location(&centres, drift_mm)
-        } else {
-            let flat: Vec<_> = centres.iter().map(nalgebra::Vector3::xy).collect();
-            location(&flat, drift_mm)
+        let axes = axes(first);
+        let result = match axes[..] {
+            [one, other] => {
+                let flat = |centre: &nalgebra::Vector3<f64>| {
+                    nalgebra::Vector2::new(centre[one.index()], centre[other.index()])
+                };
+                location(&centres.iter().map(flat).collect::<Vec<_>>(), drift_mm)
+            }
+            _ => location(&centres, drift_mm),
         };
         // Fewer than two measurements repeat nothing.
         let result = result.ok()?;
@@ -129,20 +159,38 @@ impl Repeats {
             kind: kind(first),
             pose: pose(first),
             measurements: result.n,
-            hours: (last.at - first.at).as_secs_f64() / 3600.0,
+            hours: Some((last.at - first.at).as_secs_f64() / 3600.0),
             repeatability: result.repeatability,
+            axes,
         })
+    }
+
+    fn answer(&self) -> String {
+        let name = if self.kind == "sphere" {
+            "R_SPH"
+        } else {
+            "R_CIR"
+        };
+        let parts = self.axes.iter().zip(&self.repeatability);
+        let parts = parts.map(|(axis, one)| format!("{axis} {}", um(one.value_mm)));
+        format!(
+            "{name} {} µm, of {} measurements of {}; {REPETITIONS} are usual.",
+            parts.collect::<Vec<_>>().join(", "),
+            self.measurements,
+            self.feature
+        )
     }
 
     fn row(&self, stated: bool) -> Vec<String> {
         let cell = |axis: usize| {
-            let found = self.repeatability.get(axis);
+            let place = self.axes.iter().position(|own| own.index() == axis);
+            let found = place.and_then(|place| self.repeatability.get(place));
             found.map_or_else(|| um(f64::NAN), |one| figure(one, stated))
         };
         vec![
             format!("{}, run {} on{}", self.feature, self.first_run, self.pose),
             self.measurements.to_string(),
-            format!("{:.2}", self.hours),
+            { self.hours }.map_or_else(|| "not stated".to_owned(), |hours| format!("{hours:.2}")),
             cell(0),
             cell(1),
             cell(2),

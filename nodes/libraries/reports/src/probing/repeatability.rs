@@ -8,10 +8,11 @@ use std::collections::BTreeMap;
 use iso230::ExpandedLength;
 use iso230::probing::{REPETITIONS, single_point};
 use metrology::Axis;
-use metrology::sample::{ProbedPoint, Rejection, TestSegment};
+use metrology::sample::{ProbedPoint, Rejection};
 use serde::Serialize;
 use serde_json::json;
 
+use crate::evaluate::Tests;
 use crate::evaluate::budget::Budget;
 use crate::positioning::figure;
 use crate::section::{Rows, Section, head, um};
@@ -29,13 +30,9 @@ const SAME_DIRECTION_RAD: f64 = 1e-2;
 type Touch<'a> = (u32, &'a ProbedPoint);
 
 /// The part, where a place was touched often enough.
-pub(super) fn section(
-    touches: &[(TestSegment, ProbedPoint)],
-    budget: Option<&Budget>,
-) -> Option<Section> {
+pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section> {
     let drift_mm = super::drift_mm(budget);
-    let touches = touches
-        .iter()
+    let touches = { tests.touches.iter() }
         .filter(|(_, point)| point.rejection == Rejection::None)
         .map(|(segment, point)| (segment.run, point));
     let spreads: Vec<Spread> = places(touches)
@@ -45,12 +42,15 @@ pub(super) fn section(
         .collect();
     (!spreads.is_empty()).then(|| {
         let mut section = Section::new("Repeatability of touches, ISO 230-10");
+        if super::is_list(tests) {
+            spreads.iter().for_each(|spread| section.answer(spread.answer()));
+        }
         section.tables.push(Rows {
-            head: head(&["feature", "place / mm", "feed / mm/min", "touches", "R_SPT / µm", "s / µm"]),
+            head: head(&["feature", "place / mm", "feed / mm/min", "touches", "R_SPT / µm", "s / µm", "drift / µm"]),
             rows: spreads.iter().map(|spread| spread.row(budget.is_some())).collect(),
             note: format!(
                 "R_SPT: single-point repeatability, greatest minus least touch along the approach; {REPETITIONS} touches are usual. One place: same feature, run and feed, direction of approach and rotary axes \
-                 within 0.6°, surface points within {SAME_PLACE_MM} mm of the first one. Fewer than {LEAST_TOUCHES} touches are not shown."
+                 within 0.6°, surface points within {SAME_PLACE_MM} mm of the first one. Drift: from first to last touch on the least-squares line over their order. Fewer than {LEAST_TOUCHES} touches are not shown."
             ),
         });
         section.figures = json!({ "test": section.title, "iso230_10_repeatability": spreads });
@@ -101,6 +101,8 @@ struct Spread {
     touches: usize,
     range_mm: f64,
     standard_deviation_mm: f64,
+    /// From first to last touch on the line over their order.
+    drift_mm: f64,
     repeatability: ExpandedLength,
 }
 
@@ -118,6 +120,7 @@ impl Spread {
             touches: values.len(),
             range_mm: found.repeatability.value_mm,
             standard_deviation_mm: found.standard_deviation_mm,
+            drift_mm: drift_mm_of(&values),
             repeatability: found.repeatability,
         })
     }
@@ -127,11 +130,47 @@ impl Spread {
         vec![
             self.test.clone(),
             format!("({x:.1}, {y:.1}, {z:.1})"),
-            self.feed_mm_min.to_string(),
+            match self.feed_mm_min {
+                0 => "not stated".to_owned(),
+                feed_mm_min => feed_mm_min.to_string(),
+            },
             self.touches.to_string(),
             figure(&self.repeatability, stated),
             um(self.standard_deviation_mm),
+            um(self.drift_mm),
         ]
+    }
+
+    fn answer(&self) -> String {
+        let asked = match self.touches == REPETITIONS {
+            true => String::new(),
+            false => format!("; {REPETITIONS} are usual"),
+        };
+        format!(
+            "R_SPT {} µm, s {} µm, drift {} µm from first to last, of {} touches of {}{asked}.",
+            um(self.range_mm),
+            um(self.standard_deviation_mm),
+            um(self.drift_mm),
+            self.touches,
+            self.test
+        )
+    }
+}
+
+/// Slope of the least-squares line over the order of values, times the steps from the first to the last.
+fn drift_mm_of(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let middle = (n - 1.0) / 2.0;
+    let places = (0..values.len()).map(|k| k as f64 - middle);
+    let (mut product, mut square) = (0.0, 0.0);
+    for (place, value) in places.zip(values) {
+        product += place * value;
+        square += place * place;
+    }
+    if square > 0.0 {
+        product / square * (n - 1.0)
+    } else {
+        0.0
     }
 }
 

@@ -1,0 +1,63 @@
+//! Shapes of touches that a control wrote into a list: positions of the ball's centre.
+
+use metrology::sample::{FeatureKind, ProbedFeature};
+use serde_json::{Value, json};
+
+use super::kind;
+use crate::section::{Rows, Section, head, um};
+
+/// What sizes of a list are.
+const OF_LIST: &str = "Least squares with one weight for each touch. Positions are of the ball's centre, as the control latched them: a diameter is that of sphere and ball together, of a bore that of the bore less the ball, and pretravel is in it.";
+
+/// The part, where a list has a sphere or a ring.
+pub(super) fn shapes(features: &[ProbedFeature]) -> Option<Section> {
+    let row = |feature: &ProbedFeature| {
+        let mm = |value: f64| format!("{value:.4}");
+        vec![
+            format!("{}, run {}", feature.feature_id, feature.run),
+            name(feature).to_owned(),
+            feature.n.to_string(),
+            mm(feature.centre_mm.x),
+            mm(feature.centre_mm.y),
+            mm(feature.centre_mm.z),
+            mm(2.0 * feature.radius_mm),
+            um(feature.form_mm),
+        ]
+    };
+    let rows: Vec<Vec<String>> = features.iter().map(row).collect();
+    (!rows.is_empty()).then(|| {
+        let mut section = Section::new("Shapes of the list");
+        let shape = |feature: &ProbedFeature| {
+            json!({
+                "feature": feature.feature_id,
+                "run": feature.run,
+                "kind": kind(feature),
+                "points": feature.n,
+                "centre_mm": feature.centre_mm.as_slice(),
+                "diameter_mm": 2.0 * feature.radius_mm,
+                "radius_mm": feature.radius_mm,
+                "form_mm": feature.form_mm,
+                "normal": (feature.kind != FeatureKind::Sphere).then(|| feature.normal.as_slice().to_vec()),
+            })
+        };
+        let shapes: Vec<Value> = features.iter().map(shape).collect();
+        section.figures = json!({ "test": section.title, "iso230_10_shapes": shapes });
+        section.tables.push(Rows {
+            head: head(&[
+                "feature", "kind", "points", "X / mm", "Y / mm", "Z / mm", "diameter / mm", "form / µm",
+            ]),
+            rows,
+            note: OF_LIST.to_owned(),
+        });
+        section
+    })
+}
+
+/// A list does not say from which side a ring was touched.
+const fn name(feature: &ProbedFeature) -> &'static str {
+    match feature.kind {
+        FeatureKind::Sphere => "sphere",
+        FeatureKind::Plane => "plane",
+        FeatureKind::Bore | FeatureKind::Boss => "ring or bore",
+    }
+}
