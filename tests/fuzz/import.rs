@@ -16,6 +16,8 @@ pub mod axis_names;
 pub mod beside;
 #[path = "../../nodes/abbe/src/import/clock_parts.rs"]
 pub mod clock_parts;
+#[path = "../../nodes/abbe/src/import/columns.rs"]
+pub mod columns;
 #[path = "../../nodes/abbe/src/import/dates.rs"]
 pub mod dates;
 #[path = "../../nodes/abbe/src/import/deviation_names.rs"]
@@ -54,6 +56,8 @@ pub mod parted;
 pub mod pass_names;
 #[path = "../../nodes/abbe/src/import/passes.rs"]
 pub mod passes;
+#[path = "../../nodes/abbe/src/import/probe_log.rs"]
+pub mod probe_log;
 #[path = "../../nodes/abbe/src/import/prose.rs"]
 pub mod prose;
 #[path = "../../nodes/abbe/src/import/quantities.rs"]
@@ -88,6 +92,12 @@ pub mod statement;
 pub mod table;
 #[path = "../../nodes/abbe/src/import/times.rs"]
 pub mod times;
+#[path = "../../nodes/abbe/src/import/touch_shapes.rs"]
+pub mod touch_shapes;
+#[path = "../../nodes/abbe/src/import/touches.rs"]
+pub mod touches;
+#[path = "../../nodes/abbe/src/import/turned.rs"]
+pub mod turned;
 #[path = "../../nodes/abbe/src/import/units.rs"]
 pub mod units;
 #[path = "../../nodes/abbe/src/import/unread.rs"]

@@ -127,10 +127,11 @@ pub fn machine_file(data: &[u8]) {
     }
 }
 
-const MAPS: [&str; 3] = [
+const MAPS: [&str; 4] = [
     include_str!("../import/ballbar.yaml"),
     include_str!("../import/positioning.yaml"),
     include_str!("../import/drift.yaml"),
+    include_str!("../import/touches.yaml"),
 ];
 
 /// The machine that the tables of the maps are of.
@@ -149,17 +150,29 @@ pub fn csv_import(data: &[u8]) {
     let text = metrology::text::decode(text, metrology::text::Comments::Csv);
     let sheet = text.map(|text| import::sheet::Sheet::of_text(&text, map.separator));
     if let Ok(Ok(sheet)) = sheet
+        && let Ok(sheet) = import::turned::applied(sheet, map.decimal)
         && let Ok(table) = import::table::Table::of(&sheet, &map, &ranges)
         && let Ok(runs) = import::runs::of(&map.test, &table)
     {
         let mut writer = import::writer::Writer::default();
-        let _ = import::motion::write(&map, &runs, &mut writer);
+        let _ = match &map.test {
+            import::map::Test::Touches { .. } => {
+                import::touches::write(&runs, &table.features, &mut writer)
+            }
+            _ => import::motion::write(&map, &runs, &mut writer),
+        };
     }
 }
 
-/// A file of a laser's program.
+/// A file of a laser's program, or a list of touches as a control writes it.
 pub fn laser_file(data: &[u8]) {
     let text = String::from_utf8_lossy(data);
+    if import::probe_log::is_linuxcnc(&text) {
+        let _ = import::probe_log::linuxcnc(&text);
+    }
+    if import::probe_log::is_lettered(&text) {
+        let _ = import::probe_log::lettered(&text);
+    }
     if import::renishaw_laser::is_one(&text) {
         let _ = import::renishaw_laser::cells(&text);
     }

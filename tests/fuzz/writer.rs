@@ -1,7 +1,7 @@
 //! What `abbe import` would write, counted.
 
 use anyhow::{Result, bail};
-use metrology::sample::TestSegment;
+use metrology::sample::{ProbedFeature, ProbedPoint, TestSegment};
 use metrology::stamp::Span;
 use metrology::{Axis, Host, PerAxis, Stamp};
 
@@ -53,6 +53,14 @@ impl Writer {
     }
 
     pub fn temperature(&mut self, _: &str, _: f64) -> Result<()> {
+        self.write()
+    }
+
+    pub fn touch(&mut self, _: &ProbedPoint) -> Result<()> {
+        self.write()
+    }
+
+    pub fn feature(&mut self, _: &ProbedFeature) -> Result<()> {
         self.write()
     }
 

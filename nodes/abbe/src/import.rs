@@ -24,6 +24,7 @@ mod axis_names;
 mod beside;
 mod book;
 mod clock_parts;
+mod columns;
 mod dates;
 mod deviation_names;
 mod directions;
@@ -47,6 +48,7 @@ mod odd;
 mod parted;
 mod pass_names;
 mod passes;
+mod probe_log;
 pub(crate) mod propose;
 mod prose;
 mod quantities;
@@ -67,6 +69,9 @@ mod statement;
 mod table;
 mod times;
 mod titles;
+mod touch_shapes;
+mod touches;
+mod turned;
 mod units;
 mod unlikely;
 mod unread;
@@ -238,15 +243,15 @@ pub(crate) fn import(
         map.start_s,
         Some(stated(&map, assumed, &runs)),
     )?;
-    let n_runs = motion::write(&map, &runs, &mut writer).with_context(in_table)?;
+    let n_runs = write(&map, (&table, &runs), &mut writer).with_context(in_table)?;
     let written = writer.finish()?;
     folder.finish()?;
     let mut notes = doubts(&map, &runs);
     notes.extend(place);
     notes.extend(written.in_words());
-    notes.extend(cells.form.map(str::to_owned));
-    notes.extend(cells.note);
-    notes.extend(cells.remarks);
+    let form = cells.form.map(str::to_owned);
+    notes.extend(form.into_iter().chain(cells.note).chain(cells.remarks));
+    notes.extend(cells.sheet.turned);
     notes.extend(table.left_out);
     let one_sided = one_sided(&map, &runs);
     let n_odd = table.odd.len();
@@ -264,6 +269,14 @@ pub(crate) fn import(
         n_lost_runs: n_lost,
         notes,
     })
+}
+
+/// Writes the runs of a table; gives their number.
+fn write(map: &Map, (table, runs): (&Table, &Runs), writer: &mut Writer) -> Result<u32> {
+    match &map.test {
+        map::Test::Touches { .. } => touches::write(runs, &table.features, writer),
+        _ => motion::write(map, runs, writer),
+    }
 }
 
 /// The map of a table of this machine, and a line on the places that are assumed.
@@ -320,7 +333,7 @@ fn plausible(test: &map::Test, machine: &MachineFile, runs: &Runs) -> Result<Vec
             radial_um,
             ..
         } => Ok(limits::outliers_of_circles(runs, *radius_mm, radial_um)),
-        map::Test::Log { .. } => Ok(vec![]),
+        map::Test::Log { .. } | map::Test::Touches { .. } => Ok(vec![]),
     }
 }
 
@@ -332,7 +345,7 @@ fn doubts(map: &Map, runs: &Runs) -> Vec<String> {
     let (place, likely, is_linear) = match &map.test {
         map::Test::Positioning { axis, .. } if !axis.is_linear() => (Some(2), "deg", false),
         map::Test::Positioning { .. } => (Some(2), "mm", true),
-        map::Test::Circle { .. } | map::Test::Log { .. } => {
+        map::Test::Circle { .. } | map::Test::Log { .. } | map::Test::Touches { .. } => {
             let is_read = |column: &map::Column<'_>| matches!(column.what, What::Deviation(_));
             (columns.iter().position(is_read), "mm", false)
         }

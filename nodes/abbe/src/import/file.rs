@@ -11,6 +11,7 @@ use super::book;
 use super::dates;
 use super::instrument;
 use super::sheet::{Cells, MOST_CELLS, MOST_COLUMNS, Sheet};
+use super::turned;
 
 /// Begin of a ZIP archive, which an xlsx file is.
 const ZIP: &[u8] = b"PK\x03\x04";
@@ -58,12 +59,14 @@ pub fn read(path: &Path, form: Form<'_>, is_table: &dyn Fn(&Sheet) -> bool) -> R
     if let Some(name) = form.sheet {
         bail!("sheet = {name}: does nothing, the file is a text: remove it");
     }
-    if let Some(instrument) = instrument::of(&bytes) {
+    // Numbers apart by blanks under such a map are samples of a sampler.
+    let is_sampled = form.separator == ' ';
+    if let Some(instrument) = instrument::of(&bytes).filter(|_| !is_sampled) {
         return instrument.cells(&bytes, form.decimal);
     }
     let sheet = Sheet::of_text(&text_file::read(path, Comments::Csv)?, form.separator)?;
     Ok(Cells {
-        sheet,
+        sheet: turned::applied(sheet, form.decimal)?,
         ..Cells::default()
     })
 }
@@ -196,11 +199,12 @@ fn worksheet(book: &mut Xlsx<Cursor<Vec<u8>>>, name: &str, decimal: char) -> Res
         cells.resize(width, String::new());
     }
     let dates = dates::join(&mut lines);
-    Ok(Some(Sheet {
+    let sheet = Sheet {
         lines,
         dates,
         ..Sheet::default()
-    }))
+    };
+    turned::applied(sheet, decimal).map(Some)
 }
 
 /// Lines of a worksheet that hold anything.

@@ -5,11 +5,16 @@
 
 use anyhow::{Context, Result, bail};
 
+use super::probe_log;
 use super::renishaw_laser;
 use super::sheet::Cells;
 
 /// Bytes from the begin of a file by which its form is known.
 const BYTES_LOOKED_AT: usize = 256 << 10;
+
+/// Lists of touches of controls.
+const LINUXCNC_LIST: &str = "list of touches by LinuxCNC (PROBEOPEN)";
+const LETTERED_LIST: &str = "list of touches, letters with numbers (DPRNT, FN 16)";
 
 /// A form of files.
 pub struct Instrument {
@@ -29,7 +34,17 @@ enum Content {
 }
 
 /// The forms that are known, one a line.
-static INSTRUMENTS: [Instrument; 4] = [
+static INSTRUMENTS: [Instrument; 6] = [
+    Instrument {
+        name: LINUXCNC_LIST,
+        is_one: probe_log::is_linuxcnc,
+        content: Content::Table(probe_log::linuxcnc),
+    },
+    Instrument {
+        name: LETTERED_LIST,
+        is_one: probe_log::is_lettered,
+        content: Content::Table(probe_log::lettered),
+    },
     Instrument {
         name: "Renishaw laser file (rtl, rta)",
         is_one: renishaw_laser::is_one,

@@ -109,7 +109,8 @@ pub fn targets(machine: &MachineFile, axis: Axis) -> Option<Range> {
 pub fn ranges(test: &Test, machine: &MachineFile) -> Vec<Option<Range>> {
     let [low, high] = TEMPERATURE_RANGE_DEGC;
     let range = |column: &Column<'_>| match (column.what, test) {
-        (What::Run | What::Direction, _) => None,
+        (What::Run | What::Direction | What::Feature, _) => None,
+        (What::Place(_), Test::Touches { .. }) => Some(Range::new(-1e5, 1e5, "mm")),
         (What::Place(_), Test::Positioning { axis, .. }) => targets(machine, *axis),
         (What::Place(_), _) => Some(Range::new(-ANGLE_DEG, ANGLE_DEG, "deg")),
         (What::Deviation(_) | What::Measured(_), Test::Positioning { axis, .. })
@@ -175,6 +176,7 @@ pub fn check(map: &Map, machine: &MachineFile) -> Result<()> {
             }
             feed(machine, &axes, *feed_mm_min)
         }
+        Test::Touches { .. } => Ok(()),
         Test::Log {
             axis,
             second_displacement_um,
@@ -237,7 +239,7 @@ fn numbers(map: &Map) -> Result<()> {
             let centre = centre_mm.iter().enumerate();
             numbers.extend(centre.map(|(k, mm)| (format!("test.circle.centre_mm[{k}]"), *mm)));
         }
-        Test::Log { .. } => {}
+        Test::Log { .. } | Test::Touches { .. } => {}
     }
     for (key, value) in numbers {
         check_number(ROWS, &key, value)?;

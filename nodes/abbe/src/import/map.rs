@@ -11,6 +11,7 @@ use serde::Deserialize;
 
 use super::map_schema::{with_arcsec, with_other_names};
 use super::stated;
+use super::touches;
 use super::units::Unit;
 
 /// A map file.
@@ -110,6 +111,24 @@ pub enum Test {
         /// Column of measured minus nominal radius, µm.
         radial_um: String,
     },
+    /// Touches of a probe, a row each: one place again and again, spheres, rings or bores. Positions are of the ball's centre.
+    Touches {
+        /// Column of X, mm.
+        x_mm: String,
+        /// Column of Y, mm.
+        y_mm: String,
+        /// Column of Z, mm.
+        z_mm: String,
+        /// Column of the run's number; without it a run begins where the list comes back to its first places, or pauses.
+        #[serde(default)]
+        run: Option<String>,
+        /// Column of the name of what was touched.
+        #[serde(default)]
+        feature: Option<String>,
+        /// Column of the time, s.
+        #[serde(default)]
+        time_s: Option<String>,
+    },
     /// Temperatures and one displacement, or two at two heights, while the axes stand.
     Log {
         /// The axis along which the displacement is measured.
@@ -196,6 +215,8 @@ pub struct Column<'t> {
 pub enum What {
     /// The number of a run.
     Run,
+    /// A name of what was touched.
+    Feature,
     /// A side of approach.
     Direction,
     /// A place: a target, or an angle of a circle.
@@ -217,7 +238,7 @@ impl What {
             Self::Place(unit) | Self::Deviation(unit) | Self::Measured(unit) => Some(unit),
             Self::Time => Some(Unit::Second),
             Self::Temperature => Some(Unit::Degc),
-            Self::Run | Self::Direction => None,
+            Self::Run | Self::Direction | Self::Feature => None,
         }
     }
 
@@ -316,7 +337,9 @@ impl Test {
     pub fn run(&self) -> Option<&str> {
         match self {
             Self::Circle { run, .. } => Some(run),
-            Self::Positioning { run, .. } | Self::Log { run, .. } => run.as_deref(),
+            Self::Positioning { run, .. } | Self::Log { run, .. } | Self::Touches { run, .. } => {
+                run.as_deref()
+            }
         }
     }
 
@@ -332,76 +355,10 @@ impl Test {
     pub fn moved(&self) -> Vec<Axis> {
         match self {
             Self::Positioning { axis, .. } => vec![*axis],
-            Self::Circle { .. } => Axis::LINEAR.to_vec(),
+            Self::Circle { .. } | Self::Touches { .. } => Axis::LINEAR.to_vec(),
             Self::Log { .. } => vec![],
         }
     }
-
-    /// The columns that the test needs.
-    pub fn columns(&self) -> Vec<Column<'_>> {
-        match self {
-            Self::Positioning {
-                axis,
-                run,
-                target_mm,
-                deviation_um,
-                measured_mm,
-                passes_um,
-                direction,
-                ..
-            } => {
-                let [place, deviation] = units(*axis).of_cells;
-                let run = run.iter().map(|name| column(name, What::Run));
-                let read = deviation_um.iter();
-                let read = read.map(|name| column(name, What::Deviation(deviation)));
-                let measured = measured_mm.iter();
-                let measured = measured.map(|name| column(name, What::Measured(place)));
-                let passes = passes_um.iter();
-                let passes = passes.map(|pass| column(&pass.column, What::Deviation(deviation)));
-                let direction = direction.iter();
-                let direction = direction.map(|name| column(name, What::Direction));
-                run.chain([column(target_mm, What::Place(place))])
-                    .chain(read)
-                    .chain(measured)
-                    .chain(passes)
-                    .chain(direction)
-                    .collect()
-            }
-            Self::Circle {
-                run,
-                angle_deg,
-                radial_um,
-                ..
-            } => vec![
-                column(run, What::Run),
-                column(angle_deg, What::Place(Unit::Deg)),
-                column(radial_um, What::Deviation(Unit::Um)),
-            ],
-            Self::Log {
-                run,
-                time_s,
-                displacement_um,
-                second_displacement_um,
-                temperature_degc,
-                ..
-            } => {
-                let run = run.iter().map(|name| column(name, What::Run));
-                let displacement = |name| column(name, What::Deviation(Unit::Um));
-                let fixed = [column(time_s, What::Time), displacement(displacement_um)];
-                let second = second_displacement_um.iter();
-                let fixed = fixed
-                    .into_iter()
-                    .chain(second.map(|name| displacement(name)));
-                let sensors = temperature_degc.values();
-                let sensors = sensors.map(|name| column(name, What::Temperature));
-                run.chain(fixed).chain(sensors).collect()
-            }
-        }
-    }
-}
-
-const fn column(name: &str, what: What) -> Column<'_> {
-    Column { name, what }
 }
 
 impl Map {
@@ -431,6 +388,7 @@ impl Map {
                 None => bail!("units: the column \"{name}\" has no unit that could be another"),
             }
         }
+        touches::check_units(self)?;
         stated::check_names(self)?;
         self.check_readings()
     }

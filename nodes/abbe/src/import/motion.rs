@@ -56,6 +56,7 @@ pub fn write(map: &Map, runs: &Runs, writer: &mut Writer) -> Result<u32> {
         match &map.test {
             Test::Circle { .. } => circle(map, rows, n, &mut position, writer)?,
             Test::Positioning { .. } => positioning(map, rows, n, &mut position, writer)?,
+            Test::Touches { .. } => bail!("touches have no motion"),
             Test::Log {
                 axis,
                 cause,

@@ -14,6 +14,7 @@ use super::stated::{in_one_line, quoted};
 use super::titles;
 use super::units::{Kind, Unit};
 use super::unread;
+use kinds::{Of, kind};
 pub use likely::{doubt, doubt_of_targets};
 use likely::{likely_deviation, likely_target};
 
@@ -66,6 +67,7 @@ pub fn of(path: &Path) -> Result<Proposal> {
             text.log(told)?;
         }
         Some(Of::Circle) => text.circle(&stem)?,
+        Some(Of::Touches(axes)) => text.touches(axes)?,
         None => bail!("{}", nothing::in_words(&found)),
     };
     Ok(Proposal {
@@ -74,31 +76,6 @@ pub fn of(path: &Path) -> Result<Proposal> {
         needed: text.needed,
         assumed: text.assumed,
     })
-}
-
-/// Kinds of tests.
-#[derive(Clone, Copy)]
-enum Of {
-    Positioning,
-    Log,
-    Circle,
-}
-
-fn kind(found: &Recognised) -> Option<Of> {
-    let has = |role: Role| found.first(role).is_some();
-    let is_read = has(Role::Deviation)
-        || has(Role::Measured)
-        || !found.passes().is_empty()
-        || dial::column(found).is_some();
-    if has(Role::Target) && is_read {
-        Some(Of::Positioning)
-    } else if has(Role::Time) && (has(Role::Displacement) || has(Role::Deviation)) {
-        Some(Of::Log)
-    } else if has(Role::Angle) && (has(Role::Radial) || has(Role::Deviation)) {
-        Some(Of::Circle)
-    } else {
-        None
-    }
 }
 
 fn names(found: &Recognised) -> Vec<&str> {
@@ -530,7 +507,7 @@ pub const NO_MACHINE: &str = "not_stated";
 pub fn machine_for(map: &Map) -> String {
     let (axis, sensors) = match &map.test {
         Test::Positioning { axis, .. } => (*axis, vec![]),
-        Test::Circle { .. } => (Axis::X, vec![]),
+        Test::Circle { .. } | Test::Touches { .. } => (Axis::X, vec![]),
         Test::Log {
             axis,
             temperature_degc,
@@ -567,6 +544,7 @@ mod cells;
 mod dial;
 mod epochs;
 mod file_axis;
+mod kinds;
 mod likely;
 mod looked;
 mod nothing;
@@ -578,5 +556,6 @@ mod sign;
 #[cfg(test)]
 mod tests;
 mod time_unit;
+mod touched;
 #[cfg(test)]
 mod way_words;

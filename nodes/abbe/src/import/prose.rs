@@ -209,6 +209,7 @@ fn check_test(map: &Map, line: u64, text: &str) -> Result<Option<String>> {
             axis(text, true),
             &["axis", "achse"],
         ),
+        Test::Touches { .. } => Ok(None),
         Test::Circle { plane, .. } => {
             let other = words(text).into_iter().find_map(plane_of);
             same(line, text, ("plane", *plane), other, &["plane", "ebene"])

@@ -127,7 +127,7 @@ fn is_joined_deviation(word: &str) -> bool {
 }
 
 /// Whether words of a name are those of a statistic, a limit or what was worked out of readings.
-fn is_no_reading(words: &[String]) -> bool {
+pub fn is_no_reading(words: &[String]) -> bool {
     words.iter().any(|word| {
         OF_NO_READING_WHOLE.contains(&word.as_str())
             || OF_NO_READING.iter().any(|begin| word.starts_with(begin))

@@ -16,6 +16,7 @@ use super::split_decimals;
 use super::stated::{self, Stated};
 use super::table::number_of;
 use super::times;
+use super::turned;
 use super::units::{Kind, Unit};
 use super::unread;
 use super::vocabulary::{is_correction, is_difference, is_reversed, words};
@@ -102,6 +103,11 @@ const LOOKED_AT: usize = 2000;
 const BEGIN: usize = 20_000;
 /// Looks at the cells of a file; `None`: no line of names has rows of numbers below it.
 pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
+    if let Some(turned) = turned::of(sheet, decimal) {
+        let found = of(&turned.sheet, decimal)?;
+        let odd = turned.odd.or(found.odd);
+        return Some(Recognised { odd, ..found });
+    }
     let is_number = |cell: &String| number_of(cell, decimal).is_some() || is_instant(cell);
     let n_numbers = |cells: &[String]| cells.iter().filter(|cell| is_number(cell)).count();
     let n_words = |cells: &[String]| {

@@ -22,6 +22,7 @@ use super::map::{Test, Units, units};
 use super::passes;
 use super::same;
 use super::table::{Row, Table};
+use super::touches;
 
 /// Targets nearer than this are one, mm.
 pub const SAME_TARGET_MM: f64 = 1e-9;
@@ -49,7 +50,10 @@ pub struct Runs {
 /// Line and remedy where rows contradict their column of the direction, repeat each other, or are in no order from
 /// which the motion follows.
 pub fn of(test: &Test, table: &Table) -> Result<Runs> {
-    let mut runs = ordered(test, table)?;
+    let mut runs = match test {
+        Test::Touches { .. } => touches::runs(test, table)?,
+        _ => ordered(test, table)?,
+    };
     let n = runs.runs.len();
     if n > MOST_RUNS {
         let column = test.run().map_or(String::new(), |column| {
@@ -388,6 +392,7 @@ mod tests {
             rows: rows.iter().enumerate().map(row).collect(),
             left_out: vec![],
             odd: vec![],
+            features: vec![],
         }
     }
 

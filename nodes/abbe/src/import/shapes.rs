@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::map::{Map, Pass, Test};
 use super::runs::GRID_MM;
 use super::table::Row;
+use super::touches;
 
 /// Rows as every kind of table of a test has them.
 pub fn shaped(rows: Vec<Row>, map: &Map) -> Vec<Row> {
@@ -13,6 +14,7 @@ pub fn shaped(rows: Vec<Row>, map: &Map) -> Vec<Row> {
         Test::Positioning { run: None, .. } if passes.is_empty() => {
             rows.into_iter().map(numbered).collect()
         }
+        Test::Touches { .. } => touches::shaped(rows, &map.test),
         _ if passes.is_empty() => rows,
         Test::Positioning { run: Some(_), .. } => of_runs(rows, passes),
         _ => of_passes(rows, passes),

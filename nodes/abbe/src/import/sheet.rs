@@ -28,6 +28,8 @@ pub struct Sheet {
     pub shown_units: BTreeMap<usize, String>,
     /// Lines at which a sampler lost samples.
     pub overruns: Vec<u64>,
+    /// What was done with a table whose targets are across; empty of every other one.
+    pub turned: Vec<String>,
 }
 
 /// The cells of a file, and which of its worksheets they are.

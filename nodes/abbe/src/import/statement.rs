@@ -22,7 +22,11 @@ impl Map {
                 vec![(feed, *feed_mm_min), ("dwell_s", *dwell_s)]
             }
             Test::Circle { feed_mm_min, .. } => vec![("feed_mm_min", *feed_mm_min)],
-            Test::Log { .. } => vec![],
+            Test::Log { .. } | Test::Touches { .. } => vec![],
+        };
+        let times = match &self.test {
+            Test::Touches { time_s: None, .. } => "touch_times: made_up\n",
+            _ => "",
         };
         let numbers = self.resolution().into_iter().chain(of_motion);
         let numbers = numbers.map(|(key, value)| format!("{key}: {value:?}\n"));
@@ -31,7 +35,7 @@ impl Map {
             keys => format!("assumed: [{}]\n", keys.join(", ")),
         };
         let begin = format!("start_s: {}\n", self.start_s);
-        begin + &numbers.collect::<String>() + &keys
+        begin + &numbers.collect::<String>() + times + &keys
     }
 
     /// The period of numbered samples is one, and their numbers have no unit.

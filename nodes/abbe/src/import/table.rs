@@ -19,6 +19,7 @@ use super::shapes;
 use super::sheet::Sheet;
 use super::stated;
 use super::times;
+use super::touches;
 
 /// One row.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +39,8 @@ pub struct Table {
     pub left_out: Vec<String>,
     /// Cells that hold no value of their column, a line each; they cost a row or a reading.
     pub odd: Vec<String>,
+    /// Names in a column of features, whose cells are their places here.
+    pub features: Vec<String>,
 }
 
 impl Table {
@@ -65,6 +68,7 @@ impl Table {
             n_missing: 0,
             first_missing: None,
             odd: Odd::default(),
+            features: vec![],
             is_clock: false,
             is_whole_clock: false,
         };
@@ -99,11 +103,13 @@ impl Table {
         }
         beside::check(map, head, &sheet.lines[at + 1..], &rows)?;
         left_out.extend(measured::check(map, head, &sheet.lines[at + 1..], &rows)?);
+        let features = reader.features;
         let rows = shapes::shaped(rows, map);
         Ok(Self {
             rows,
             left_out,
             odd,
+            features,
         })
     }
 }
@@ -119,6 +125,7 @@ struct Reader<'t> {
     /// Line and column of the first.
     first_missing: Option<(u64, String)>,
     odd: Odd,
+    features: Vec<String>,
     /// Whether a time was no plain number, and whether it had a date or three parts.
     is_clock: bool,
     is_whole_clock: bool,
@@ -161,6 +168,10 @@ impl Reader<'_> {
                 let first = (line, column.name.to_owned());
                 self.first_missing.get_or_insert(first);
                 numbers.push(f64::NAN);
+                continue;
+            }
+            if column.what == What::Feature {
+                numbers.push(touches::feature_of(cell, &mut self.features));
                 continue;
             }
             let range = self.ranges.get(k).and_then(Option::as_ref);

@@ -38,7 +38,7 @@ pub fn warnings(test: &Test, runs: &[Vec<Row>]) -> Vec<String> {
             let values: Vec<f64> = read.map_or_else(Vec::new, values);
             of_log(&values).into_iter().collect()
         }
-        Test::Circle { .. } => vec![],
+        Test::Circle { .. } | Test::Touches { .. } => vec![],
     }
 }
 

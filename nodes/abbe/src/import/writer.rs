@@ -9,7 +9,10 @@ use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Message, Qos, Wire, to_cdr};
 use anyhow::{Context, Result, anyhow, bail};
 use machine::MachineFile;
-use metrology::sample::{AngleSample, AxisState, LengthSample, TemperatureSample, TestSegment};
+use metrology::sample::{
+    AngleSample, AxisState, LengthSample, ProbedFeature, ProbedPoint, TemperatureSample,
+    TestSegment,
+};
 use metrology::stamp::Span;
 use metrology::{Axis, AxisSet, PerAxis, Stamp, epoch};
 use recorder::{
@@ -225,6 +228,32 @@ impl Writer {
         };
         let message = abbe_msgs::sensor_msgs::msg::Temperature::from_inner(&sample);
         self.put(name, topics::TEMPERATURE.qos, &message)
+    }
+
+    /// A touch; its instant is now.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn touch(&mut self, point: &ProbedPoint) -> Result<()> {
+        let point = ProbedPoint {
+            received_at: self.at,
+            ..point.clone()
+        };
+        let topic = &topics::PROBE_POINT;
+        self.write(topic, topic.name.to_owned(), &point)
+    }
+
+    /// A shape that touches are of; its instant is now.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn feature(&mut self, feature: &ProbedFeature) -> Result<()> {
+        let feature = ProbedFeature {
+            at: self.at,
+            ..feature.clone()
+        };
+        let topic = &topics::PROBE_FEATURE;
+        self.write(topic, topic.name.to_owned(), &feature)
     }
 
     /// Begin or end of a run; its instant is now.

@@ -6,7 +6,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use metrology::yaml;
 use reports::whole_file::{self, Vanishing};
 
-use crate::import::map::Map;
+use crate::import::map::{Map, Test};
 use crate::import::{self, Named, propose};
 use crate::report_bag::foreign_log::{self, Log};
 
@@ -117,7 +117,14 @@ pub fn of_log(
 /// # Errors
 /// As [`of`], and where the machine could not have been measured so.
 pub fn of_machine(path: &Path, map: Option<&Path>, machine: Named) -> Result<FromTable> {
-    let (described, _) = described(path, map)?;
+    let (described, read) = described(path, map)?;
+    if matches!(read.test, Test::Touches { .. }) {
+        bail!(
+            "{}: a list of touches: it has no axis' motion of which a cause could be found; `abbe report {}` evaluates it by ISO 230-10",
+            path.display(),
+            path.display()
+        );
+    }
     imported(path, described, machine)
 }
 

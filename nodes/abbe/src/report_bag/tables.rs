@@ -8,6 +8,7 @@ use crate::import::Import;
 mod conditions;
 mod instruments;
 mod odd;
+mod touched;
 
 const REFERENCE: &str = include_str!("../../../../tests/validation/iso230_tables.json");
 /// Rounding of made-up motions and of sums; a table has steps of 0.01 µm or 0.1″.

@@ -8,7 +8,7 @@ use node_runtime::text_file::{self, Comments};
 use super::super::file::{self, Form};
 use super::super::recognise::{self, Recognised};
 use super::super::sheet::Sheet;
-use super::kind;
+use super::kinds::kind;
 
 /// What was seen in a file.
 #[derive(Default)]

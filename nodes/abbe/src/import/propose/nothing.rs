@@ -16,7 +16,7 @@ pub fn in_words(found: &Recognised) -> String {
     }
     unread::in_words(found).unwrap_or_else(|| {
         format!(
-            "{}{}{}{}columns {}: neither targets with deviations, nor a time with a displacement, nor angles with radial deviations: write a map (docs/reference/scenario.md#import-map)",
+            "{}{}{}{}columns {}: neither targets with deviations, nor a time with a displacement, nor angles with radial deviations, nor x, y and z of touches: write a map (docs/reference/scenario.md#import-map)",
             pass_names::unsure(found),
             sign::unsure(found),
             deviation_names::unsure(found),

@@ -60,7 +60,7 @@ fn a_proposal_is_a_map_of_a_machine_that_can_be_read() {
             .unwrap_or_else(|error| panic!("{error:#}: {}", proposal.map));
         let found = match map.test {
             Test::Positioning { axis, .. } | Test::Log { axis, .. } => axis,
-            Test::Circle { .. } => Axis::X,
+            Test::Circle { .. } | Test::Touches { .. } => Axis::X,
         };
         assert_eq!(found, axis, "{name}");
         assert!(proposal.map.contains("NEEDED"), "{}", proposal.map);
