@@ -50,6 +50,8 @@ POSITIONING = {
 for name in ("rotary_one_run", "rotary_one_way"):
     POSITIONING[name] = POSITIONING["rotary_table"]
 WIDE = {"wide_table": ("laser_X.csv", GERMAN)}
+# Recording: a form with the targets across, one row for each pass.
+ACROSS = {"targets_across": ("across.csv", GERMAN)}
 # Recording: a file in the form of Renishaw's laser programs, and its unit of deviations in um or arcsec.
 LASER_FILES = {"laser_file": ("laser.rtl", 1.0), "laser_file_rotary": ("rotary.rta", 648.0 / np.pi)}
 # Recording: table, displacement, column of the run.
@@ -100,6 +102,19 @@ def wide(name, table, form):
     for line in lines:
         at, *cells = (float(cell.replace(form["decimal"], ".")) for cell in line)
         found += [("up" if "↑" in title else "down", at, cell) for title, cell in zip(head[1:], cells)]
+    return found
+
+
+def across(name, table, form):
+    """Rows whose name has a number and an arrow are passes; the row of targets is above them."""
+    number = lambda cell: float(cell.replace(form["decimal"], "."))
+    found, targets = [], []
+    for title, *cells in rows_of_cells(name, table, form):
+        if title.startswith("Target"):
+            targets = [number(cell) for cell in cells]
+        elif title[0].isdigit():
+            side = "up" if "↑" in title else "down"
+            found += [(side, target, number(cell)) for target, cell in zip(targets, cells)]
     return found
 
 
@@ -233,6 +248,7 @@ def main():
     folder = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else RECORDINGS
     tests = {name: [positioning(readings(name, *how))] for name, how in POSITIONING.items()}
     tests |= {name: [positioning(wide(name, *how))] for name, how in WIDE.items()}
+    tests |= {name: [positioning(across(name, *how))] for name, how in ACROSS.items()}
     tests |= {name: [positioning(laser_file(name, *how))] for name, how in LASER_FILES.items()}
     tests |= {name: list(logs(name, *how)) for name, how in LOGS.items()}
     tests["slipped_clamp"] = list(circles("slipped_clamp", "ballbar_XY.csv", 100.0))
