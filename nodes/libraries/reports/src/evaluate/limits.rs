@@ -132,7 +132,7 @@ impl Limits {
     pub fn section(&self, tests: &[Value]) -> Result<Section> {
         let mut section = Section::new("Conformance, ISO 14253-1").ranked(Rank::Answer);
         let mut verdicts = Vec::new();
-        let mut one_sided = BTreeSet::new();
+        let mut remarks = BTreeSet::new();
         let mut table = Rows {
             head: head(&["figure", "test", "value", "limits", "decision", "P"]),
             note: format!(
@@ -154,9 +154,7 @@ impl Limits {
                     row[DECISION].push_str(WITH_DEVIATIONS);
                 }
                 table.rows.push(row);
-                if let Some(key) = judged.lacks_lower(name, *limit).filter(|_| why.is_none()) {
-                    one_sided.insert((name, key));
-                }
+                remarks.extend(judged.remarks(name, *limit, why.is_none()));
                 let mut entry = serde_json::json!({ "figure": name, "test": title(test) });
                 if let Some(why) = why {
                     let about = format!("{name}, {}", title(test));
@@ -173,8 +171,8 @@ impl Limits {
                 verdicts.push(entry);
             }
         }
-        for (name, key) in one_sided {
-            section.warn("Limited on one side", one_sided_line(name, key));
+        for (kind, line) in remarks {
+            section.warn(kind, line);
         }
         conclude(&mut section, table, verdicts);
         Ok(section)
@@ -196,13 +194,6 @@ fn conclude(section: &mut Section, table: Rows, verdicts: Vec<Value>) {
     section.answers.push(in_short(&table.rows));
     section.tables.push(table);
     section.figures = verdicts.into();
-}
-
-/// A figure with a sign that has no lower limit.
-fn one_sided_line(name: &str, key: &str) -> String {
-    format!(
-        "limits.{name}: the figure may be negative, and without {key} every value below the upper limit conforms: state {key} too."
-    )
 }
 
 /// Figures by test.

@@ -16,7 +16,7 @@ const LEAST_SHARING: usize = 3;
 const LEAST_SHARED: usize = 6;
 const TIMES_THE_OTHERS: usize = 4;
 /// Other values, at least: a dial of a coarse step shows few.
-const LEAST_OTHERS: usize = 6;
+const LEAST_OTHER_VALUES: usize = 6;
 /// What warnings of such readings have in common.
 const ONE_VALUE: &str = "Readings at one value";
 
@@ -44,7 +44,7 @@ pub(super) fn name(section: &mut Section, test: &LinearTest) {
         let most = others.map(|(_, other)| other.n).max().unwrap_or(0);
         let is_clipped = shared.n >= LEAST_SHARED.max(TIMES_THE_OTHERS * most)
             && shared.targets.len() >= LEAST_SHARING
-            && values.len() > LEAST_OTHERS;
+            && values.len() > LEAST_OTHER_VALUES;
         if is_clipped {
             section.warn(
                 ONE_VALUE,

@@ -5,9 +5,10 @@ use iso230::conformance::{
     AngularSpecification, Decision, Policy, Specification, decide, decide_angle,
 };
 use iso230::{ExpandedAngle, ExpandedLength};
+use metrology::number::quantity;
 use serde_json::Value;
 
-use super::limit::Limit;
+use super::limit::{Limit, NEVER_NEGATIVE};
 use crate::positioning::shown_title;
 use crate::section::um;
 
@@ -18,6 +19,9 @@ pub const CONFORMS: &str = "conforms";
 const SIGNED: [&str; 3] = ["mean_reversal", "mean_radial_deviation", "size_error"];
 /// An end of a range of deviations, which one limit is enough for.
 const EXTREMES: [&str; 2] = ["greatest_radial_deviation", "least_radial_deviation"];
+
+/// An upper limit below it is smaller than what any machine keeps, µm: mm were meant.
+const LEAST_UPPER_UM: f64 = 0.1;
 
 /// A figure with its uncertainty.
 #[derive(Clone, Copy, Debug)]
@@ -126,8 +130,53 @@ impl Judged {
         })
     }
 
+    /// What is unlikely about limits of this figure: the kind of warning and its line.
+    pub fn remarks(
+        &self,
+        name: &str,
+        limit: Limit,
+        is_decided: bool,
+    ) -> Vec<(&'static str, String)> {
+        let one_sided = self.lacks_lower(name, limit).filter(|_| is_decided);
+        let one_sided = one_sided.map(|key| {
+            let line = format!(
+                "limits.{name}: the figure may be negative, and without {key} every value below the upper limit conforms: state {key} too."
+            );
+            ("Limited on one side", line)
+        });
+        one_sided
+            .into_iter()
+            .chain(self.too_small(name, limit))
+            .collect()
+    }
+
+    /// An upper limit that no measurement of this figure can be held against.
+    fn too_small(&self, name: &str, limit: Limit) -> Option<(&'static str, String)> {
+        let Quantity::Length(length) = self.figure.quantity else {
+            return None;
+        };
+        let last = name.rsplit('.').next().unwrap_or(name);
+        let upper_um = limit.upper_um.filter(|_| NEVER_NEGATIVE.contains(&last))?;
+        let expanded_um = length.expanded_uncertainty_mm * 1e3;
+        let below = if upper_um < LEAST_UPPER_UM {
+            format!("{LEAST_UPPER_UM} µm, what no machine keeps")
+        } else if upper_um < expanded_um {
+            format!(
+                "U = {} µm of the figure, so that no measurement shows that it conforms",
+                um(length.expanded_uncertainty_mm)
+            )
+        } else {
+            return None;
+        };
+        let line = format!(
+            "limits.{name}.upper_um = {}: is below {below}: state it in µm, not in mm.",
+            quantity("upper_um", upper_um)
+        );
+        Some(("Limit too small", line))
+    }
+
     /// Which limit is missing, where the figure may be negative and has an upper one alone: its key.
-    pub fn lacks_lower(&self, name: &str, limit: Limit) -> Option<&'static str> {
+    fn lacks_lower(&self, name: &str, limit: Limit) -> Option<&'static str> {
         let (value, key, has_no_lower) = match self.figure.quantity {
             Quantity::Length(length) => (length.value_mm, "lower_um", limit.lower_um.is_none()),
             Quantity::Angle(angle) => (
@@ -224,6 +273,36 @@ mod tests {
         ] {
             assert_eq!(super::figure_in_words(name), words);
         }
+    }
+
+    #[test]
+    fn an_upper_limit_in_mm_or_below_u_is_named_with_value_limit_and_remedy() {
+        let warned = |value_mm: f64, upper: &str| {
+            let figure =
+                serde_json::json!({"value_mm": value_mm, "expanded_uncertainty_mm": 0.000_8});
+            let test = serde_json::json!({"test": "X", "iso230_2": {"accuracy": figure}});
+            let text =
+                format!("rule: simple\nlimits:\n  iso230_2.accuracy: {{upper_um: {upper}}}\n");
+            let limits = Limits::read(&text, Path::new("limits.yaml")).unwrap();
+            let section = limits.section(&[test]).unwrap();
+            let lines = section.warnings.into_iter().map(|warning| warning.line);
+            lines.collect::<Vec<_>>()
+        };
+        for (upper, below) in [
+            ("0.020", "0.1 µm, what no machine keeps"),
+            ("0.5", "U = 0.80 µm"),
+        ] {
+            let said = warned(0.012, upper);
+            assert_eq!(said.len(), 1, "{said:?}");
+            for words in [
+                "limits.iso230_2.accuracy.upper_um = ",
+                below,
+                "in µm, not in mm",
+            ] {
+                assert!(said[0].contains(words), "{words}: {said:?}");
+            }
+        }
+        assert_eq!(warned(0.012, "20.0"), Vec::<String>::new());
     }
 
     #[test]

@@ -30,7 +30,7 @@ const GREATEST_ARCSEC: f64 = 1_296_000.0;
 const GREATEST_OTHER: f64 = 1e12;
 
 /// Figures that are never negative, by the last part of their names.
-const NEVER_NEGATIVE: [&str; 6] = [
+pub(super) const NEVER_NEGATIVE: [&str; 6] = [
     "accuracy",
     "repeatability",
     "systematic_error",
