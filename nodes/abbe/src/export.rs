@@ -2,6 +2,7 @@
 
 use node_runtime::complain;
 use reports::evaluate::Tests;
+use reports::evaluate::budget::Budget;
 use reports::loss;
 use reports::whole_file;
 
@@ -25,6 +26,7 @@ mod found;
 mod origin;
 mod references;
 mod set_up;
+mod temperature;
 mod travel;
 
 use counting::Counting;
@@ -125,6 +127,9 @@ pub struct Export {
     /// Where no positioning run gave a table, make one of the stops of a verification along one axis, as its scale or the control read them.
     #[arg(long)]
     stops: bool,
+    /// What is known about the measurements, as `abbe report` takes it: tables of a laser's runs are corrected to 20 °C by it.
+    #[arg(long)]
+    budget: Option<PathBuf>,
     /// Use components although the recordings do not determine them by themselves.
     #[arg(long)]
     accept_unestimable: bool,
@@ -146,6 +151,7 @@ impl Export {
         };
         self.check(format)
             .map_err(|reason| refused("export", reason))?;
+        let budget = self.budget.as_deref().map(Budget::open).transpose()?;
         let bag = Bag::open(&self.bag)?;
         machines::check(bag.topics()).with_context(|| self.bag.display().to_string())?;
         let Found {
@@ -159,7 +165,10 @@ impl Export {
             let tests = Tests::of(&bag);
             let more = tests.reading.lines().into_iter();
             losses.extend(more.filter(|line| !reading.lines().contains(line)));
-            origin.of_references = references::tables(&tests, &mut measured);
+            if let Some(budget) = &budget {
+                budget.check_tests(&tests)?;
+            }
+            origin.of_references = references::tables(&tests, budget.as_ref(), &mut measured);
             if self.stops {
                 origin.of_stops = tables_of_stops(&tests.stops, &mut measured);
             }
@@ -296,6 +305,12 @@ impl Export {
         if format == Format::Sinumerik && self.set_up.sign().is_some() && !has_drift {
             lines.push(
                 "--sign has no effect: the bag holds no thermal drift, and the signs of the other tables are in the control's manual".to_owned(),
+            );
+        }
+        let is_of_laser = |axis: &Axis| origin.of_references[*axis].is_some();
+        if self.budget.is_some() && !Axis::LINEAR.iter().any(is_of_laser) {
+            lines.push(
+                "--budget has no effect: no table is made of a laser's runs, and no other one is corrected to 20 °C".to_owned(),
             );
         }
         let has_tables = Axis::ALL.iter().any(|axis| origin.tables[*axis].is_some());

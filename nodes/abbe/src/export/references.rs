@@ -12,9 +12,12 @@ use metrology::{Axis, PerAxis};
 use recorder::Bag;
 use reports::evaluate::Tests;
 use reports::evaluate::angular::RotaryTest;
+use reports::evaluate::budget::Budget;
+use reports::evaluate::correction::{About, Measured as Conditions};
 use reports::evaluate::linear::{LinearTest, Reference};
 
 use super::found::is;
+use super::temperature;
 
 /// Whether a bag has readings of an external reference.
 pub(super) fn are_in(bag: &Bag) -> bool {
@@ -27,28 +30,34 @@ pub(super) fn are_in(bag: &Bag) -> bool {
 
 /// A table for each axis that has none and was measured with nothing added to its commands; the last such test counts. Says
 /// of each what it was made of.
-pub(super) fn tables(tests: &Tests, measured: &mut Measured) -> PerAxis<Option<String>> {
-    let linear = tests.linear.iter().filter_map(of_linear);
+pub(super) fn tables(
+    tests: &Tests,
+    budget: Option<&Budget>,
+    measured: &mut Measured,
+) -> PerAxis<Option<String>> {
+    let linear = tests.linear.iter();
+    let linear = linear.filter_map(|test| of_linear(tests, budget, test));
     let rotary = tests.rotary_positioning.iter().filter_map(of_rotary);
-    let mut last = PerAxis::<Option<(PositioningTable, String)>>::default();
+    let mut last = PerAxis::<Option<Made>>::default();
     let mut all = PerAxis::<Vec<String>>::default();
-    for (table, said) in linear.chain(rotary) {
-        let axis = table.axis;
-        all[axis].push(utc_of_nanos(table.at.nanos(), 0));
-        last[axis] = Some((table, said));
+    for made in linear.chain(rotary) {
+        let axis = made.table.axis;
+        all[axis].push(utc_of_nanos(made.table.at.nanos(), 0));
+        last[axis] = Some(made);
     }
     let mut told = PerAxis::<Option<String>>::default();
     for axis in Axis::ALL {
         let known = &mut measured.tables[axis];
         if known.is_none()
-            && let Some((table, said)) = last[axis].take()
+            && let Some(made) = last[axis].take()
         {
             // A table is of no instant of the control.
             *known = Some(PositioningTable {
                 at: Stamp::from_nanos(0),
-                ..table
+                ..made.table
             });
-            told[axis] = Some(said + &others(&all[axis]));
+            measured.remarks[axis].extend(made.remark);
+            told[axis] = Some(made.said + &others(&all[axis]));
         }
     }
     told
@@ -66,33 +75,58 @@ fn others(began: &[String]) -> String {
     }
 }
 
-fn of_linear(test: &LinearTest) -> Option<(PositioningTable, String)> {
+/// A table of a reference's runs.
+#[derive(Debug)]
+struct Made {
+    table: PositioningTable,
+    /// What it was made of.
+    said: String,
+    /// What a reader of the table must know.
+    remark: Option<String>,
+}
+
+/// The table of runs along one axis, at 20 °C where a budget has what corrects them.
+fn of_linear(tests: &Tests, budget: Option<&Budget>, test: &LinearTest) -> Option<Made> {
     let is_wanted = test.kind == TestKind::Positioning
         && test.reference == Reference::Length
         && !test.compensated;
     let axis = test.axis.filter(|_| is_wanted)?;
-    Means {
+    let correction = Conditions::of(tests, budget, About::line(test)).correction;
+    let runs = correction.runs_at_20_degc(test, vec![]);
+    let means = Means {
         axis,
-        targets: &test.targets_mm,
-        sides: [&test.up_mm, &test.down_mm],
+        targets: &runs.targets_mm,
+        sides: [&runs.up_mm, &runs.down_mm],
         mean: test.mean_mm,
         first_run: test.first_run,
         began: test.began,
-    }
-    .table()
+    };
+    let (table, said) = means.table()?;
+    let state = temperature::state(&correction);
+    Some(Made {
+        said: format!("{said}, {state}"),
+        remark: Some(temperature::remark(&correction, &table)),
+        table,
+    })
 }
 
-fn of_rotary(test: &RotaryTest) -> Option<(PositioningTable, String)> {
+fn of_rotary(test: &RotaryTest) -> Option<Made> {
     let axis = Some(test.axis).filter(|_| test.has_readings)?;
-    Means {
+    let means = Means {
         axis,
         targets: &test.targets_rad,
         sides: [&test.up_rad, &test.down_rad],
         mean: test.mean_rad,
         first_run: test.first_run,
         began: test.began,
-    }
-    .table()
+    };
+    let (table, said) = means.table()?;
+    let remark = None;
+    Some(Made {
+        table,
+        said,
+        remark,
+    })
 }
 
 /// Most that an axis is off at its zero, mm and rad: zeros of reference and axis that differ by more are different ones.
@@ -133,7 +167,7 @@ impl Means<'_> {
         let (axis, first_run, n) = (self.axis, self.first_run, self.targets.len());
         let n_runs = up.len().max(down.len());
         let said = format!(
-            "positioning of {axis}: means {sides} of {n_runs} runs (run {first_run} on) of an external reference at {n} targets, {of_zero} and not corrected to 20 °C"
+            "positioning of {axis}: means {sides} of {n_runs} runs (run {first_run} on) of an external reference at {n} targets, {of_zero}"
         );
         let table = PositioningTable {
             at: Stamp::from_nanos(self.began.nanos()),
@@ -159,7 +193,7 @@ impl Means<'_> {
             return (self.mean, said);
         }
         let said = format!(
-            "counted from the mean of all, {}, which is taken out: the reference was zeroed at another place than the axis,",
+            "counted from the mean of all, {}, which is taken out: the reference was zeroed at another place than the axis",
             self.in_words()
         );
         (0.0, said)
@@ -213,6 +247,12 @@ mod tests {
         }
     }
 
+    /// Without a budget.
+    fn made(test: &LinearTest) -> (PositioningTable, String) {
+        let made = of_linear(&Tests::default(), None, test).unwrap();
+        (made.table, made.said)
+    }
+
     #[test]
     fn of_two_measurements_of_an_axis_the_last_is_taken_and_both_are_named() {
         let begun = |s: i64| LinearTest {
@@ -224,7 +264,7 @@ mod tests {
             ..Tests::default()
         };
         let mut measured = Measured::default();
-        let told = tables(&tests, &mut measured);
+        let told = tables(&tests, None, &mut measured);
         let said = told[Axis::X].as_ref().unwrap();
         let words = "the last of 2 measurements in the bag, begun at 2026-01-06 11:46:40 UTC; not in it: 2026-01-05 08:00:00 UTC";
         assert!(said.contains(words), "{said}");
@@ -242,7 +282,7 @@ mod tests {
             ..Tests::default()
         };
         let mut measured = Measured::default();
-        let told = tables(&tests, &mut measured);
+        let told = tables(&tests, None, &mut measured);
         let x = measured.tables[Axis::X].clone().unwrap();
         assert_eq!(x.position, [0.0, 42.0, 83.0]);
         for (found, wanted) in [
@@ -263,7 +303,7 @@ mod tests {
             linear: vec![laser(Axis::X, Reference::Length, false)],
             ..Tests::default()
         };
-        assert!(tables(&other, &mut measured)[Axis::X].is_none());
+        assert!(tables(&other, None, &mut measured)[Axis::X].is_none());
         assert_eq!(measured.tables[Axis::X], learned);
     }
 
@@ -271,19 +311,19 @@ mod tests {
     fn deviations_are_as_read_where_both_zeros_are_one_and_from_their_mean_where_not() {
         let mut one = laser(Axis::X, Reference::Length, false);
         one.mean_mm = -0.0016;
-        let (table, said) = of_linear(&one).unwrap();
+        let (table, said) = made(&one);
         assert!((table.deviation_up[0] - 0.0004).abs() < 1e-12, "{table:?}");
         assert!(
             (table.deviation_down[2] + 0.0036).abs() < 1e-12,
             "{table:?}"
         );
         assert!(
-            said.ends_with("as read (their mean, -1.600 um, is in them: pages of abbe report take it out) and not corrected to 20 °C"),
+            said.ends_with("as read (their mean, -1.600 um, is in them: pages of abbe report take it out), not corrected to 20 °C"),
             "{said}"
         );
         // The laser counts from the begin of the travel.
         one.mean_mm = 280.0;
-        let (table, said) = of_linear(&one).unwrap();
+        let (table, said) = made(&one);
         assert!((table.deviation_up[0] - 0.002).abs() < 1e-12, "{table:?}");
         assert!(
             said.contains("counted from the mean of all, +280000.000 um, which is taken out")
@@ -296,7 +336,7 @@ mod tests {
     fn of_one_side_both_are_that_side_and_it_is_said() {
         let mut one = laser(Axis::X, Reference::Length, false);
         one.down_mm = vec![];
-        let (table, said) = of_linear(&one).unwrap();
+        let (table, said) = made(&one);
         assert_eq!(table.deviation_up, table.deviation_down);
         assert!(said.contains("up alone"), "{said}");
     }

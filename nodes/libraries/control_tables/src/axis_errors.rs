@@ -5,6 +5,7 @@ use metrology::{Axis, ErrorComponent};
 
 use super::cross_errors::CrossErrors;
 use super::error::ExportError;
+use super::file::one_line;
 use super::grid::{Grid, SAME};
 use machine::volumetric::on_line;
 
@@ -15,6 +16,8 @@ pub struct AxisErrors {
     position: Vec<f64>,
     up: Vec<f64>,
     down: Vec<f64>,
+    /// What a reader of a table must know of them, a note each.
+    remarks: Vec<String>,
 }
 
 impl AxisErrors {
@@ -36,7 +39,21 @@ impl AxisErrors {
             position,
             up,
             down,
+            remarks: vec![],
         })
+    }
+
+    /// With notes that stand in every file that is made of them.
+    #[must_use]
+    pub fn with_remarks(self, remarks: &[String]) -> Self {
+        let remarks = remarks.iter().map(|remark| one_line(remark)).collect();
+        Self { remarks, ..self }
+    }
+
+    /// Notes that stand in every file that is made of them.
+    #[must_use]
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
     }
 
     /// The deviations of a table. Scale minus motor is where the slide is minus where the control, which
@@ -85,7 +102,8 @@ impl AxisErrors {
                 .collect()
         };
         let (up, down) = (sample(&self.up), sample(&self.down));
-        Self::new(self.axis, position, up, down)
+        let sampled = Self::new(self.axis, position, up, down)?;
+        Ok(sampled.with_remarks(&self.remarks))
     }
 
     /// Relative to the error at `reference`: there the mean of both directions becomes zero. Allowed because
@@ -100,6 +118,7 @@ impl AxisErrors {
             position: self.position.clone(),
             up: less(&self.up),
             down: less(&self.down),
+            remarks: self.remarks.clone(),
         }
     }
 
@@ -117,6 +136,7 @@ impl AxisErrors {
             position: self.position.clone(),
             up: mean.clone(),
             down: mean,
+            remarks: self.remarks.clone(),
         }
     }
 

@@ -56,7 +56,7 @@ pub fn table(positioning: &[AxisErrors], others: &[CrossErrors], known: &Known) 
         }
     }
     text.push_str(known.rows());
-    let notes = vec![
+    let mut notes = vec![
         "error = actual - commanded, of the tool relative to the workpiece".to_owned(),
         "compensation = what is added to the command = -error".to_owned(),
         "up and down: motion towards greater and smaller positions of the base axis".to_owned(),
@@ -64,6 +64,8 @@ pub fn table(positioning: &[AxisErrors], others: &[CrossErrors], known: &Known) 
         "standard_uncertainty_if_known, in the unit of the value, k = 1: of components and drift, by their fits; empty where it is not known: of effects (a positioning table states none, a sum of components has those of its component rows, which are correlated), and of what is not estimable or identifiable by itself".to_owned(),
         "no control: the sign is that of this table's words".to_owned(),
     ];
+    let remarks = positioning.iter().flat_map(AxisErrors::remarks);
+    notes.extend(remarks.cloned());
     ExportFile::new("errors.csv".to_owned(), text, notes)
 }
 

@@ -127,6 +127,7 @@ pub fn pitch_table(errors: &AxisErrors, set_up: &PitchTable) -> Result<Pitch, Ex
     text.push_str("%\n");
     let numbers = (first + 1, first + (sums.len() - 1) as i64);
     let mut notes = notes(errors, set_up, spacing);
+    notes.extend_from_slice(errors.remarks());
     let (least, greatest) = numbers;
     notes.push(format!(
         "set 3605#0 = 0, 3620 = {}, 3621 = {least}, 3622 = {greatest}, 3623 = {}, 3624 = {} {}",

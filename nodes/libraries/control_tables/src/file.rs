@@ -18,6 +18,17 @@ impl ExportFile {
     }
 }
 
+/// A note as every control reads it: one line, and letters of ASCII alone.
+pub(super) fn one_line(note: &str) -> String {
+    let note = note.replace("°C", "degC").replace('µ', "u");
+    let plain = |letter: char| match letter {
+        letter if letter.is_control() => ' ',
+        letter if letter.is_ascii() => letter,
+        _ => '?',
+    };
+    note.chars().map(plain).collect()
+}
+
 /// Each note as a comment line that begins with `mark`.
 pub(super) fn comments(mark: &str, notes: &[String]) -> String {
     notes

@@ -111,7 +111,8 @@ pub fn compensation_table(
         check_steepness(axis, positioning.position(), column)?;
     }
     let text = table(name, positioning, &columns);
-    let notes = notes(name, positioning, others, sign);
+    let mut notes = notes(name, positioning, others, sign);
+    notes.extend_from_slice(positioning.remarks());
     Ok(ExportFile::new(format!("{name}.COM"), text, notes))
 }
 

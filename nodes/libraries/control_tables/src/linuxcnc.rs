@@ -112,7 +112,8 @@ pub fn compensation_file(
         text.push('\n');
     }
     let name = format!("{}.comp", axis.letter().to_lowercase());
-    let notes = notes(errors, file_type, &name);
+    let mut notes = notes(errors, file_type, &name);
+    notes.extend_from_slice(errors.remarks());
     text.push_str(&comments("#", &notes));
     Ok(ExportFile::new(name, text, notes))
 }

@@ -23,6 +23,8 @@ pub use controls::{Control, Fanuc, PitchTables, Sinumerik};
 pub struct Measured {
     /// Positioning tables by axis.
     pub tables: PerAxis<Option<PositioningTable>>,
+    /// What a reader of each of these tables must know, a note each.
+    pub remarks: PerAxis<Vec<String>>,
     /// Thermal drift.
     pub thermal: Option<ThermalModel>,
     /// Geometric errors.
@@ -198,7 +200,8 @@ fn positioning(
             if fitted.is_some() {
                 selected.leave_out(own.to_string(), Reason::TableUsed);
             }
-            from_table(table, wanted)
+            let errors = from_table(table, wanted);
+            errors.map(|errors| errors.with_remarks(&measured.remarks[axis]))
         }
         (None, Some(model)) => span(model, axis, &[own]).map_or(Err(Reason::NoSpan), |span| {
             from_model(model, wanted, own, span)

@@ -89,6 +89,7 @@ pub fn two_way_tables(errors: &AxisErrors, set_up: &PitchTable) -> Result<Pitch,
     let place = usize::try_from(i64::from(set_up.reference_number) - first).unwrap_or(0);
     let at_down = down.get(place).copied().unwrap_or(0);
     let mut notes = notes(errors, set_up, spacing);
+    notes.extend_from_slice(errors.remarks());
     notes.push(format!(
         "set 3605#0 = 1, 3620 = {}, 3621 = {}, 3622 = {}, 3623 = 1, 3624 = {} {}, 3626 = {}, 3627 = {at_down} (a reference return in the positive direction; in the negative one {}), 1851 = 1852 = 0: the lost motion is in the tables",
         set_up.reference_number,

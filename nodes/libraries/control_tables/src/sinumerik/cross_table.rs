@@ -58,7 +58,12 @@ pub fn cross_table(errors: &CrossErrors, set_up: &CrossTable) -> Result<ExportFi
         error: errors.error(),
     };
     let table = rows.table(set_up, set_up.table, Traverse::Both)?;
-    Ok(program(&[table], set_up, errors.base(), &errors.names()))
+    Ok(program(
+        &[table],
+        set_up,
+        (errors.base(), &errors.names()),
+        &[],
+    ))
 }
 
 /// Two tables of one axis on itself: errors up and errors down.
@@ -86,8 +91,8 @@ pub fn direction_tables(
     Ok(program(
         &tables,
         set_up,
-        axis,
-        "positioning, a table for each direction",
+        (axis, "positioning, a table for each direction"),
+        errors.remarks(),
     ))
 }
 
@@ -182,9 +187,14 @@ impl Rows<'_> {
     }
 }
 
-fn program(tables: &[String], set_up: &CrossTable, base: Axis, what: &str) -> ExportFile {
+fn program(
+    tables: &[String],
+    set_up: &CrossTable,
+    (base, what): (Axis, &str),
+    remarks: &[String],
+) -> ExportFile {
     let (input, output) = (&set_up.input_axis, &set_up.output_axis);
-    let notes = vec![
+    let mut notes = vec![
         format!("SINUMERIK cross-axis compensation of {output} by the setpoint of {input}: {what}"),
         format!(
             "positions in {} of {input}, values in mm (degrees where {output} is rotary)",
@@ -199,6 +209,7 @@ fn program(tables: &[String], set_up: &CrossTable, base: Axis, what: &str) -> Ex
             set_up.table
         ),
     ];
+    notes.extend_from_slice(remarks);
     let mut text = "%_N_NC_CEC_INI\nCHANDATA(1)\n".to_owned();
     text.push_str(&comments(";", &notes));
     for table in tables {

@@ -58,7 +58,8 @@ pub fn encoder_table(
 
     let index = format!("{},{}", set_up.encoder, set_up.machine_axis);
     let mut text = "%_N_AX_EEC_INI\nCHANDATA(1)\n".to_owned();
-    let notes = notes(errors, set_up);
+    let mut notes = notes(errors, set_up);
+    notes.extend_from_slice(errors.remarks());
     text.push_str(&comments(";", &notes));
     for (n, e) in error.iter().enumerate() {
         let value = fixed(mm_or_deg(axis, SIGN.value_of(*e)), VALUE_DECIMALS);

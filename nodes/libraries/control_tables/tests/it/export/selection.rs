@@ -54,6 +54,7 @@ fn measured() -> Measured {
     ecc.span = (-1.0, 1.0);
     Measured {
         tables,
+        remarks: PerAxis::default(),
         thermal: Some(thermal(drift(1.0))),
         geometry: Some(model(curves)),
         rotary: Some(model(vec![curve("EY0A", &[-0.02]), ecc])),
@@ -388,4 +389,39 @@ fn an_axis_that_cannot_be_made_does_not_stop_the_others() {
     assert_eq!(files(&select(&measured(), &one, &fanuc())), ["PITCH_Y.TXT"]);
     let nothing = select(&Measured::default(), &wanted(), &Control::Csv);
     assert_eq!(nothing, Selected::default());
+}
+
+#[test]
+fn a_remark_about_a_table_stands_in_every_file_of_it_on_one_line_of_ascii() {
+    let mut measured = measured();
+    measured.remarks[Axis::X].push("positioning of X: 22 °C,\n8.8 µm taken out".to_owned());
+    let told = "positioning of X: 22 degC, 8.8 um taken out";
+    let Control::Sinumerik(each_direction) = sinumerik() else {
+        return;
+    };
+    let each_direction = Control::Sinumerik(Sinumerik {
+        for_each_direction: true,
+        ..each_direction
+    });
+    for (control, name, mark) in [
+        (
+            Control::LinuxCnc(FileType::ActualPosition),
+            "x.comp",
+            Some("# "),
+        ),
+        (sinumerik(), "AX_EEC_X1.INI", Some("; ")),
+        (each_direction, "NC_CEC_0_X1_X1.INI", Some("; ")),
+        (Control::Heidenhain(Some(Sign::Plus)), "X_AXIS.COM", None),
+        (fanuc(), "PITCH_X.TXT", None),
+        (Control::Csv, "errors.csv", None),
+    ] {
+        let selected = select(&measured, &wanted(), &control);
+        let mut files = selected.files.iter();
+        let file = files.find(|file| file.name == name).unwrap();
+        assert!(file.notes.iter().any(|note| note == told), "{name}");
+        if let Some(mark) = mark {
+            let line = format!("{mark}{told}");
+            assert!(file.text.lines().any(|own| own == line), "{}", file.text);
+        }
+    }
 }
