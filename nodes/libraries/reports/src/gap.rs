@@ -20,7 +20,9 @@ pub mod designed;
 pub mod diagnosed;
 mod drawings;
 mod first_screen;
+mod floor;
 mod heat;
+mod logs;
 mod look_alikes;
 pub mod planned;
 mod sentences;
@@ -54,7 +56,8 @@ pub fn page(title: &str, diagnosed: &Diagnosed, explain: bool) -> Result<Report>
     let simulator = diagnosed.simulated.iter().flat_map(Simulated::in_words);
     let lines = lost.into_iter().chain(simulator).chain(answers);
     let lines: Vec<String> = lines.collect();
-    let sections = sections(diagnosed);
+    let mut sections = sections(diagnosed);
+    sections.splice(0..0, logs::sections(report, &figures.drifts)?);
     let notes: Vec<String> = notes(diagnosed);
     let traces = drawings::traces(&figures.traces)?;
     let look_alikes = look_alikes::section(&figures.isolability);
@@ -233,7 +236,7 @@ fn sections(diagnosed: &Diagnosed) -> Vec<Section> {
     let all = [
         causes(diagnosed),
         places(diagnosed).ranked(Rank::Detail),
-        gap(report).ranked(Rank::Detail),
+        floor::section(report).ranked(Rank::Detail),
         held_out(diagnosed),
         next(report),
         not_excited(report).ranked(Rank::Detail),
@@ -471,46 +474,6 @@ fn places(diagnosed: &Diagnosed) -> Section {
         &names,
         rows.collect(),
         "Alone: share of the structured gap that only this explains, in brackets its 95 % interval over the runs, where these are enough to tell one; p: chance of so much in noise, over all places that were looked at.",
-    )
-}
-
-fn gap(report: &GapReport) -> Section {
-    let rows = report.gap.per_channel.iter().map(|channel| {
-        let noise = report
-            .noise_floor
-            .iter()
-            .find(|n| n.channel == channel.channel);
-        let of = |value: fn(&gap_diagnosis::report::NoiseFloor) -> String| {
-            noise.map_or_else(|| "—".to_owned(), value)
-        };
-        vec![
-            channel.channel.clone(),
-            three(channel.rms_um),
-            three(channel.p95_um),
-            three(channel.floor_um),
-            if channel.above_floor { "yes" } else { "no" }.to_owned(),
-            of(|n| three(n.sigma_um)),
-            of(|n| maybe(n.between_runs_um)),
-            of(|n| n.repeats.to_string()),
-            of(|n| if n.reproduced { "yes" } else { "no" }.to_owned()),
-        ]
-    });
-    let names = [
-        "channel",
-        "gap rms µm",
-        "95 % µm",
-        "floor µm",
-        "above it",
-        "noise of a reading µm",
-        "between runs µm",
-        "repeats",
-        "reproduced",
-    ];
-    section(
-        GAP,
-        &names,
-        rows.collect(),
-        "Above it: by more than noise and the error of form that every simulator is taken to have (0.2 µm). Rotary axes in mrad, thermometers in mK.",
     )
 }
 

@@ -2,6 +2,7 @@
 
 use gap_diagnosis::report::{Cause, GapReport, Interval, NextExperiment, Status};
 
+use super::logs;
 use super::sentences::since;
 use super::words::{in_units, name};
 use super::{NOT_DETERMINED, separated, spoken_key, three, told};
@@ -18,7 +19,7 @@ const NARROW: f64 = 0.02;
 pub(super) fn of(report: &GapReport, losses: &[String]) -> Screen {
     Screen {
         verdict: Some(verdict(report)),
-        tiles: [closed(report), Some(largest(report))]
+        tiles: [logs::tile(report), closed(report), Some(largest(report))]
             .into_iter()
             .flatten()
             .collect(),

@@ -2,6 +2,7 @@
 
 use gap_diagnosis::report::{Cause, GapReport, Status};
 
+use super::logs;
 use super::words::{self, name};
 use super::{maybe, three, told, values};
 
@@ -17,9 +18,10 @@ pub(super) fn lost(losses: &[String]) -> Option<String> {
     ))
 }
 
-/// The three answers.
+/// The answers: of logs the thermometers that they go with, then where, which, how far.
 pub(super) fn answers(report: &GapReport) -> Vec<String> {
-    vec![place(report), cause(report), shrink(report)]
+    let three = [place(report), cause(report), shrink(report)];
+    logs::sentences(report).into_iter().chain(three).collect()
 }
 
 fn place(report: &GapReport) -> String {
