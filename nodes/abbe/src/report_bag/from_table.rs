@@ -18,6 +18,11 @@ const WARNING: &str = "warning, ";
 /// Begin of a line with what was assumed of a column.
 const ASSUMED: &str = "warning, column ";
 
+/// The key whose assumed value is in angles and relative lengths.
+const RADIUS: &str = "radius_mm";
+/// What that means.
+const OF_RADIUS: &str = ": it is assumed, and squareness and scale are off by as much as it is";
+
 /// A bag of a table.
 pub struct FromTable {
     /// Its folder, which goes away with this.
@@ -174,6 +179,7 @@ fn proposed(path: &Path) -> Result<(Named, Vec<String>, Vec<String>)> {
     let needed = proposal.needed.into_iter();
     lines.extend(needed.map(|line| match line.strip_prefix("column ") {
         Some(rest) => format!("{ASSUMED}{rest}"),
+        None if line.starts_with(RADIUS) => format!("{WARNING}{line}{OF_RADIUS}"),
         None => format!("not in the table: {line}"),
     }));
     let named = Named {

@@ -466,7 +466,12 @@ fn val_a_table_alone_has_the_figures_of_its_standard() {
         arcsec,
         reference("rotary", "a"),
     );
-    let (report, _) = reported_alone(&root("tests/import/ballbar.csv"));
+    let (report, lines) = reported_alone(&root("tests/import/ballbar.csv"));
+    // Squareness and scale rest on the radius, which nobody stated.
+    assert!(
+        lines[0].starts_with("warning, radius_mm = 100.0"),
+        "{lines:?}"
+    );
     assert!(
         report.terminal().contains("ISO 230-4"),
         "{}",
