@@ -58,6 +58,8 @@ const MIN_COSINE_OF_PLAY: f64 = 0.95;
 const GONE: f64 = 0.05;
 /// A block in which a signature has a smaller size over noise does not show it.
 const MIN_D_SHOWN: f64 = 2.0;
+/// Below this share of its feed an axis comes to rest.
+const STANDS: f64 = 0.05;
 /// Below this speed an axis stands, mm/s.
 const STANDS_MM_S: f64 = 1e-3;
 
@@ -89,8 +91,7 @@ pub(crate) fn list(stack: &Stack<'_>, signatures: &Library, members: &mut [Membe
 /// (1).
 fn is_of_one_feed(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> bool {
     // Where an axis stands while it is read the whole run says how it came there.
-    let came = |motion: &Motion| feed_mm_s(motion, 0..motion.time_s.len());
-    let feeds = feeds_mm_s(stack, instance, values, came);
+    let feeds = feeds_mm_s(stack, instance, values, whole_feed_mm_s);
     feeds.is_some_and(|[slowest, fastest]| fastest <= ONE_FEED * slowest)
 }
 
@@ -135,7 +136,8 @@ fn feeds_mm_s(
     let feeds = blocks.filter_map(|block| {
         let motion = &stack.session.runs[block.run].motion;
         let read = block.rows.iter().filter_map(|row| row.tick);
-        feed_mm_s(motion, read).or_else(|| at_rest(motion))
+        let stands_mm_s = STANDS * whole_feed_mm_s(motion)?;
+        feed_mm_s(motion, read, stands_mm_s).or_else(|| at_rest(motion))
     });
     feeds.fold(None, |range, feed| {
         let [low, high] = range.unwrap_or([feed, feed]);
@@ -143,8 +145,13 @@ fn feeds_mm_s(
     })
 }
 
-/// The feed of a run, (1), by some of its ticks.
-fn feed_mm_s(motion: &Motion, ticks: impl Iterator<Item = usize>) -> Option<f64> {
+/// The feed of a run, (1), by all of its ticks.
+fn whole_feed_mm_s(motion: &Motion) -> Option<f64> {
+    feed_mm_s(motion, 0..motion.time_s.len(), STANDS_MM_S)
+}
+
+/// The feed of a run, (1), by some of its ticks; slower than `stands_mm_s` it stands.
+fn feed_mm_s(motion: &Motion, ticks: impl Iterator<Item = usize>, stands_mm_s: f64) -> Option<f64> {
     let speed = |tick: usize| -> f64 {
         let along = Axis::LINEAR.iter();
         let along = along.filter_map(|axis| motion.velocity[*axis].get(tick));
@@ -152,7 +159,7 @@ fn feed_mm_s(motion: &Motion, ticks: impl Iterator<Item = usize>) -> Option<f64>
     };
     let mut speeds: Vec<f64> = ticks
         .map(speed)
-        .filter(|speed| *speed > STANDS_MM_S)
+        .filter(|speed| *speed > stands_mm_s)
         .collect();
     speeds.sort_by(f64::total_cmp);
     let last = speeds.len().checked_sub(1)?;
