@@ -229,6 +229,17 @@ fn an_angular_error_is_among_what_a_slope_can_be_where_nobody_states_the_other_a
     );
 }
 
+/// Of three turns of the screw a curve of slower waves follows more than half: the wave is one of a set with it.
+#[test]
+fn a_wave_over_three_turns_is_one_of_a_set_with_a_curve() {
+    let (report, said) = diagnosed("tests/import/steps.csv", "tests/import/steps.yaml", MACHINE);
+    let found = told(&report, "set");
+    let names: Vec<&str> = found.iter().map(|(effect, _, _)| *effect).collect();
+    assert_eq!(names, ["backlash", "cyclic_error"], "{said}");
+    assert_eq!(told(&report, "named"), []);
+    assert_eq!(instead(&report, "cyclic_error"), ["pitch_error"]);
+}
+
 /// A laser's table: 12 um/m of scale, 5 um of backlash, 0.15 um between runs, 0.2 um of noise.
 fn laser(noise: &mut Pcg64Mcg, runs: u32) -> String {
     let mut normal = |size: f64| -> f64 {
