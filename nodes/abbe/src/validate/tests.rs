@@ -56,7 +56,7 @@ fn three_mistakes_in_three_files_are_all_told() {
     assert_eq!(findings.mistakes.len(), 3, "{said}");
     // Lines are those of `grep -n`; the lead's range is that of the machine file's table.
     for words in [
-        &["machine.yaml:", "axes.X.lead_mm = 0", "0.01"][..],
+        &["machine.yaml:", "axes.X.lead_mm = 0", "0.2"][..],
         &["limits.yaml:", "rool"],
         &["plant.yaml:", "sead"],
     ] {

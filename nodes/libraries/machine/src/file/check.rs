@@ -15,6 +15,8 @@ use crate::error::MachineFileError;
 
 /// Nearer corners are those of one block, mm.
 const SAME_CORNER_MM: f64 = 1.0;
+const LEADS: &str =
+    "must be from 0.2 to 500 mm, the leads of screws and racks: state it in mm, not in m or µm";
 const BALL_RADII: &str =
     "must be from 0.02 to 30 mm, the radii of styli: state it in mm, not in m or µm";
 const STYLUS_LENGTHS: &str =
@@ -40,6 +42,7 @@ impl MachineFile {
         let check = Check { source_name };
         check.amounts(self)?;
         check.ros_name("name", &self.name)?;
+        check.sizes(self)?;
         check.physics(self)?;
         for (axis, entry) in &self.axes {
             let key = format!("axes.{axis}");
@@ -279,26 +282,39 @@ impl Check<'_> {
         for name in probe.styli.keys() {
             self.ros_name(&format!("probe.styli.{name}"), name)?;
         }
-        self.sizes(&probe.styli)?;
         self.stems(&probe.styli)?;
         let known = probe.styli.contains_key(&probe.mounted);
         let rule = "must be one of probe.styli";
         self.name("probe.mounted", &probe.mounted, known, rule)
     }
 
-    /// Refuses sizes that no stylus has: a slip of m or µm.
-    fn sizes(&self, styli: &BTreeMap<String, StylusEntry>) -> Result<(), MachineFileError> {
-        for (name, stylus) in styli {
-            let lengths = [
-                ("length_mm", Some(stylus.length_mm)),
-                ("stem_length_mm", stylus.stem_length_mm),
-            ];
-            let lengths =
-                lengths.map(|(key, mm)| (key, mm, limits::STYLUS_LENGTH_MM, STYLUS_LENGTHS));
-            let radius_mm = Some(stylus.radius_mm);
-            let radius = ("radius_mm", radius_mm, limits::BALL_RADIUS_MM, BALL_RADII);
-            for (key, mm, range, rule) in [radius].into_iter().chain(lengths) {
-                let Some(mm) = mm else { continue };
+    /// Refuses leads of axes and sizes of styli that none has: a slip of m or µm.
+    fn sizes(&self, file: &MachineFile) -> Result<(), MachineFileError> {
+        for (axis, entry) in &file.axes {
+            if let AxisEntry::Linear(linear) = entry {
+                let holds = limits::LEAD_MM.contains(&linear.lead_mm);
+                let key = format!("axes.{axis}.lead_mm");
+                self.number(&key, linear.lead_mm, holds, LEADS)?;
+            }
+        }
+        for (name, stylus) in &file.probe.styli {
+            let stem_mm = stylus.stem_length_mm.unwrap_or(stylus.length_mm);
+            let lengths = limits::STYLUS_LENGTH_MM;
+            for (key, mm, range, rule) in [
+                (
+                    "radius_mm",
+                    stylus.radius_mm,
+                    limits::BALL_RADIUS_MM,
+                    BALL_RADII,
+                ),
+                (
+                    "length_mm",
+                    stylus.length_mm,
+                    lengths.clone(),
+                    STYLUS_LENGTHS,
+                ),
+                ("stem_length_mm", stem_mm, lengths, STYLUS_LENGTHS),
+            ] {
                 let key = format!("probe.styli.{name}.{key}");
                 self.number(&key, mm, range.contains(&mm), rule)?;
             }

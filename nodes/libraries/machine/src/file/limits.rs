@@ -12,7 +12,7 @@ const FINEST_UM: f64 = 1e-6;
 pub const REPEATABILITY_UM: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 
 /// Lead of a screw, or way of a rack for a turn of its motor: from watch parts to gantries of 30 m. A slip of m or µm lies outside.
-const LEAD_MM: std::ops::RangeInclusive<f64> = 0.2..=500.0;
+pub(super) const LEAD_MM: std::ops::RangeInclusive<f64> = 0.2..=500.0;
 /// Radius of a ball that touches: from micro styli and nozzles to probes of large castings.
 pub(super) const BALL_RADIUS_MM: std::ops::RangeInclusive<f64> = 0.02..=30.0;
 /// Length of a stylus, from its seat and from the spindle nose.

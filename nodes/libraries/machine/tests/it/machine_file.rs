@@ -318,12 +318,12 @@ fn numbers_and_lists_beyond_their_bounds_are_refused_by_key_value_and_bound() {
         (
             "lead_mm: 10.0",
             "lead_mm: 0.01",
-            "axes.X.lead_mm = 0.01 mm: must be from 0.2 to 500 mm",
+            "axes.X.lead_mm = 0.01 mm: must be from 0.2 to 500 mm, the leads of screws and racks: state it in mm, not in m or µm",
         ),
         (
             "lead_mm: 10.0",
             "lead_mm: 10000.0",
-            "axes.X.lead_mm = 10000 mm: must be from 0.2 to 500 mm",
+            "axes.X.lead_mm = 10000 mm: must be from 0.2 to 500 mm, the leads",
         ),
     ] {
         let said = refusal(from, to);
