@@ -323,7 +323,7 @@ impl Body {
 /// Refuses a thermometer that stopped to measure, or reads what no budget may state.
 fn check_range(name: &str, readings: &Readings) -> Result<(), String> {
     if let Some(dead) = readings.dead {
-        return Err(format!("names a {}", dead.in_words(name)));
+        return Err(format!("names a dead thermometer: {}", dead.in_words(name)));
     }
     let [low, high] = [-FARTHEST_READ_K, FARTHEST_READ_K].map(|off_k| REFERENCE_DEGC + off_k);
     let both = [readings.least_degc, readings.greatest_degc];

@@ -1,6 +1,7 @@
 //! Budget files that are read, and those that are refused.
 
 use super::*;
+use crate::evaluate::thermometer::Dead;
 use iso230::circular::{CircularTest, CircularTrace, evaluate};
 
 pub(super) const WHOLE: &str = "
@@ -51,6 +52,22 @@ fn readings(degc: &[f64]) -> Readings {
     let mut readings = Readings::new(degc[0]);
     degc[1..].iter().for_each(|value| readings.add(*value));
     readings
+}
+
+#[test]
+fn no_length_is_corrected_by_a_thermometer_that_fell_to_zero() {
+    let text = WHOLE.replacen("temperature_deviation_k: 0.5", "thermometers: [bed]", 1);
+    let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
+    let mut bed = readings(&[22.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    bed.dead = Some(Dead {
+        before_degc: Some(22.1),
+        degc: 0.0,
+        n: 5,
+    });
+    let read = Thermometers::from([("bed".to_owned(), bed)]);
+    let why = budget.machine_body().temperature(&read).unwrap_err();
+    let words = "names a dead thermometer: thermometer bed reads 0 °C 5 times one after another, after 22.1 °C";
+    assert!(why.starts_with(words), "{why}");
 }
 
 #[test]

@@ -159,17 +159,17 @@ impl Judged {
         let upper_um = limit.upper_um.filter(|_| NEVER_NEGATIVE.contains(&last))?;
         let expanded_um = length.expanded_uncertainty_mm * 1e3;
         let below = if upper_um < LEAST_UPPER_UM {
-            format!("{LEAST_UPPER_UM} µm, what no machine keeps")
+            format!("{LEAST_UPPER_UM} µm, what no machine keeps: state it in µm, not in mm")
         } else if upper_um < expanded_um {
             format!(
-                "U = {} µm of the figure, so that no measurement shows that it conforms",
+                "U = {} µm of the figure, so that no measurement shows that it conforms: measure with a smaller U, or state it in µm where it is in mm",
                 um(length.expanded_uncertainty_mm)
             )
         } else {
             return None;
         };
         let line = format!(
-            "limits.{name}.upper_um = {}: is below {below}: state it in µm, not in mm.",
+            "limits.{name}.upper_um = {}: is below {below}.",
             quantity("upper_um", upper_um)
         );
         Some(("Limit too small", line))
@@ -290,14 +290,14 @@ mod tests {
         };
         for (upper, below) in [
             ("0.020", "0.1 µm, what no machine keeps"),
-            ("0.5", "U = 0.80 µm"),
+            ("0.5", "U = 0.80 µm of the figure"),
         ] {
             let said = warned(0.012, upper);
             assert_eq!(said.len(), 1, "{said:?}");
             for words in [
                 "limits.iso230_2.accuracy.upper_um = ",
                 below,
-                "in µm, not in mm",
+                "state it in µm",
             ] {
                 assert!(said[0].contains(words), "{words}: {said:?}");
             }
