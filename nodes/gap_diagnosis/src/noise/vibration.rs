@@ -12,15 +12,15 @@
 //!   Z      = sum over tests of n R2,   R = |sum c_r| / sum |c_r|              (7)
 //! ```
 //!
-//! e is the residual of the readings of one channel, evenly sampled; N the number of frequencies, lengths of segments and channels
-//! that are looked at, K the segments that (2) is worth. No slope and no hump of noise that is wider than [`spectrum`]'s neighbours is a
-//! line. Each run has to show it as well, at a chance of [`SHOWN`].
+//! e is the residual of the readings of one channel, of a plate or ballbar in one plane, evenly sampled; N the number of
+//! frequencies, lengths of segments and channels that are looked at, K the segments that (2) is worth. No slope and no hump of noise that is wider than [`spectrum`]'s neighbours is a
+//! line. Each run has to show it as well, at a chance of [`CHANCE_OF_ONE_RUN`].
 //!
 //! An error along the path has a frequency at one feed, too, and then one phase in all repeats: (7), with phases about the middle
 //! of the path, is above what random phases reach. Such a line is not reported here.
 //!
-//! It names no cause. Its amplitude and frequency may wander by the width of the neighbours; where the sampling is slower than
-//! twice the frequency, what is seen is an alias.
+//! It names no cause. Readings slower than ten a second are not looked at. Its amplitude and frequency may wander by the width of the neighbours; where the sampling is slower than
+//! twice the frequency, what is seen is an alias. Of a frequency that wanders farther than that, (6) is the middle: a lower bound.
 //!
 //! # Agreement
 //! `white_noise_has_no_line`: none in 1,000 seeds. `val_numpy_vibration`: a series of numpy whose amplitude and phase wander
@@ -32,6 +32,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 
+use metrology::sample::TestPlane;
 use rustfft::num_complex::Complex64;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use twin::{Channel, Run, Session};
@@ -49,21 +50,23 @@ use spectrum::{Spectrum, Window, median};
 /// (4) at which a line is reported.
 const MAX_CHANCE: f64 = 1e-3;
 /// Chance at which one run shows a line.
-const SHOWN: f64 = 0.05;
+const CHANCE_OF_ONE_RUN: f64 = 0.05;
 /// Share of the runs that show it.
-const MIN_SHARE_OF_RUNS: f64 = 2.0 / 3.0;
+const MIN_SHARE_WITH_LINE: f64 = 2.0 / 3.0;
 /// Fewest runs that show it, where not all do.
-const FEWEST_RUNS: usize = 3;
+const MIN_RUNS_WITH_LINE: usize = 3;
 /// Chance of (7) below which a line has one phase in all repeats.
 const ONE_PHASE: f64 = 0.01;
 /// Most lines of a channel.
 const MOST_LINES: usize = 3;
 /// Lengths of segments.
-const SEGMENT: [usize; 2] = [128, 4096];
+const SEGMENT_LENGTHS: [usize; 2] = [128, 4096];
+/// Longest time between readings of a vibration, s: slower cycles are of heating or cooling.
+const LONGEST_PERIOD_S: f64 = 0.1;
 /// Sampling periods that differ by less are one.
-const SAME_PERIOD: f64 = 0.02;
+const ONE_PERIOD_WITHIN: f64 = 0.02;
 /// Feeds that differ by less are one.
-const SAME_FEED: f64 = 0.05;
+const ONE_FEED_WITHIN: f64 = 0.05;
 
 /// The noise of one run of one channel.
 struct Sampled {
@@ -128,23 +131,49 @@ pub(crate) fn of(
     residual: &[Vec<f64>],
     channels: &[&Channel],
 ) -> BTreeMap<Channel, Vec<Vibration>> {
-    let is_continuous =
-        |channel: &&&Channel| !matches!(channel, Channel::Touch | Channel::Thermometer(_));
-    let looked_at: Vec<&Channel> = channels.iter().filter(is_continuous).copied().collect();
-    let of_channel = |channel: &&Channel| {
-        let runs = session.runs.iter().enumerate().zip(residual);
-        let runs = runs.filter_map(|((run, _), own)| Sampled::new(session, run, channel, own));
-        let found = of_runs(session, runs.collect(), looked_at.len());
-        (!found.is_empty()).then(|| ((*channel).clone(), found))
-    };
-    looked_at.iter().filter_map(of_channel).collect()
+    let mut looked_at = BTreeMap::<(Channel, &str), Vec<Sampled>>::new();
+    for channel in channels {
+        if matches!(channel, Channel::Touch | Channel::Thermometer(_)) {
+            continue;
+        }
+        for (run, own) in residual.iter().enumerate() {
+            if let Some(sampled) = Sampled::new(session, run, channel, own) {
+                let key = ((*channel).clone(), plane(&session.runs[run], channel));
+                looked_at.entry(key).or_default().push(sampled);
+            }
+        }
+    }
+    let looks = looked_at.len();
+    let mut found = BTreeMap::<Channel, Vec<Vibration>>::new();
+    for ((channel, plane), runs) in looked_at {
+        let mut own = of_runs(session, runs, looks);
+        own.iter_mut()
+            .for_each(|line| plane.clone_into(&mut line.plane));
+        if !own.is_empty() {
+            found.entry(channel).or_default().extend(own);
+        }
+    }
+    found
+}
+
+/// The plane of a run, where the channel's direction depends on it; otherwise empty.
+fn plane(run: &Run, channel: &Channel) -> &'static str {
+    match (channel, run.segment.plane) {
+        (Channel::GridU | Channel::GridV | Channel::Radial, TestPlane::Xy) => "XY",
+        (Channel::GridU | Channel::GridV | Channel::Radial, TestPlane::Yz) => "YZ",
+        (Channel::GridU | Channel::GridV | Channel::Radial, TestPlane::Zx) => "ZX",
+        _ => "",
+    }
 }
 
 /// Vibrations of the runs of one of so many channels, by the longest segments that show one.
 fn of_runs(session: &Session, mut runs: Vec<Sampled>, channels: usize) -> Vec<Vibration> {
     let mut periods: Vec<f64> = runs.iter().map(|run| run.period_s).collect();
     let period_s = median(&mut periods);
-    runs.retain(|run| (run.period_s / period_s - 1.0).abs() < SAME_PERIOD);
+    if period_s > LONGEST_PERIOD_S {
+        return vec![];
+    }
+    runs.retain(|run| (run.period_s / period_s - 1.0).abs() < ONE_PERIOD_WITHIN);
     let lengths = lengths(&runs);
     let looks = channels * lengths.len();
     let mut found = lengths
@@ -186,6 +215,7 @@ fn by_segments(
             of: spectra.len(),
             sampled_hz: 1.0 / first.period_s,
             period_mm: None,
+            plane: String::new(),
             chance: line.chance,
         }
     });
@@ -196,9 +226,11 @@ fn by_segments(
 /// Lengths of segments, the longest that three runs in four have first: a frequency that wanders is a line of short ones alone.
 fn lengths(runs: &[Sampled]) -> Vec<usize> {
     let mut own: Vec<usize> = runs.iter().map(Sampled::longest).collect();
-    own.retain(|length| *length >= SEGMENT[0]);
+    own.retain(|length| *length >= SEGMENT_LENGTHS[0]);
     own.sort_unstable();
-    let usual = own.get(own.len() / 4).map(|usual| usual.min(&SEGMENT[1]));
+    let usual = own
+        .get(own.len() / 4)
+        .map(|usual| usual.min(&SEGMENT_LENGTHS[1]));
     let Some(longest) = usual
         .filter(|_| own.len() > 1)
         .map(|usual| 1 << usual.ilog2())
@@ -206,7 +238,9 @@ fn lengths(runs: &[Sampled]) -> Vec<usize> {
         return vec![];
     };
     let shorter = std::iter::successors(Some(longest), |length| Some(length / 2));
-    shorter.take_while(|length| *length >= SEGMENT[0]).collect()
+    shorter
+        .take_while(|length| *length >= SEGMENT_LENGTHS[0])
+        .collect()
 }
 
 /// The lines of a mean that its runs show, the surest first.
@@ -230,12 +264,12 @@ fn lines(mean: &Spectrum, spectra: &[Spectrum], looks: usize) -> Vec<Line> {
             let near = place.saturating_sub(1)..=place + 1;
             let ratios = near.filter_map(|k| own.ratio(k));
             let least = ratios.map(|(_, chance)| chance).fold(1.0, f64::min);
-            3.0 * least < SHOWN
+            3.0 * least < CHANCE_OF_ONE_RUN
         };
         let runs = spectra.iter().filter(shows).count();
         let is_in_all = runs == spectra.len();
-        let is_in_most = count(runs) >= MIN_SHARE_OF_RUNS * count(spectra.len());
-        if is_in_all || (runs >= FEWEST_RUNS && is_in_most) {
+        let is_in_most = count(runs) >= MIN_SHARE_WITH_LINE * count(spectra.len());
+        if is_in_all || (runs >= MIN_RUNS_WITH_LINE && is_in_most) {
             found.push(Line {
                 place,
                 chance,
@@ -356,6 +390,6 @@ fn one_feed(session: &Session, runs: &[Sampled]) -> Option<f64> {
     let usual = median(&mut speeds);
     let is_one = speeds
         .iter()
-        .all(|own| (own / usual - 1.0).abs() < SAME_FEED);
+        .all(|own| (own / usual - 1.0).abs() < ONE_FEED_WITHIN);
     (usual > 0.0 && is_one).then_some(usual)
 }

@@ -15,6 +15,8 @@ use crate::search::searched::Base;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Vibration {
+    /// Plane of the runs, where the channel's direction depends on it; otherwise empty.
+    pub plane: String,
     /// Frequency, as sampled: it or an alias of it, Hz.
     pub frequency_hz: f64,
     /// Half of the 95 % interval of the frequency, Hz.

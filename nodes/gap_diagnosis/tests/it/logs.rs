@@ -161,6 +161,62 @@ fn a_night_that_was_not_logged_is_neither_warm_nor_a_cause() {
     assert!((hours - 22.5).abs() < 0.05, "{hours}");
 }
 
+/// The nose goes up by 3 µm/K at once, in a room that warms by 0.1 K meanwhile: that explains nothing, and the gauge's sign is asked about.
+#[test]
+fn a_room_that_warms_by_a_tenth_of_a_kelvin_explains_nothing() {
+    let machine = machine(FRONT);
+    let mut log = Log::new(&machine, 71);
+    log.segment(1, true, 0.0);
+    for minute in 0..180 {
+        let at_s = 60.0 * f64::from(minute);
+        let k = warm_k(8.0, 2400.0, at_s);
+        let um = 3.0 * k + log.normal(0.1);
+        let spindle = 20.0 + k + log.normal(0.02);
+        let room = 20.0 + warm_k(0.1, 2400.0, at_s) + log.normal(0.02);
+        log.row(at_s, um, &[("spindle_front", spindle), ("bed", room)]);
+    }
+    log.segment(1, false, 10_740.0);
+    let diagnosis = log.diagnosed(&machine);
+    let [follows] = &diagnosis.report.follows[..] else {
+        panic!("{:#?}", diagnosis.report.follows)
+    };
+    let [spindle] = &follows.thermometers[..] else {
+        panic!("{follows:#?}")
+    };
+    assert_eq!(
+        (follows.channel.as_str(), spindle.thermometer.as_str()),
+        ("length.Z", "spindle_front")
+    );
+    assert!(
+        (spindle.um_per_k - 3.0).abs() < 0.03 && follows.share > 0.99,
+        "{follows:#?}"
+    );
+    let fit = diagnosis.notes.iter().find_map(|note| match note {
+        Note::GoesWith { found, .. } => Some(found),
+        _ => None,
+    });
+    let alone: Vec<&str> = { fit.expect("a remark").alone.iter() }
+        .map(|(id, _)| id.as_str())
+        .collect();
+    assert_eq!(alone, ["spindle_front"]);
+    let shrinks = diagnosis.notes.iter().any(|note| match note {
+        Note::ShrinksWarming { um, by_thermometer } => (*um + 30.0).abs() < 3.0 && *by_thermometer,
+        _ => false,
+    });
+    assert!(shrinks, "{:#?}", diagnosis.notes);
+    let drift = &diagnosis.figures.drifts[0];
+    let off = drift.deviation_um.iter().zip(&drift.model_um);
+    assert!(
+        off.map(|(read, model)| (read - model).abs())
+            .fold(0.0, f64::max)
+            < 0.6
+    );
+    assert_eq!(
+        (drift.temperatures.len(), drift.is_by_thermometers),
+        (2, true)
+    );
+}
+
 /// How six equal warm-ups are logged.
 struct Logged {
     rows: u32,

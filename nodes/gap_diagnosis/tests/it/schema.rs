@@ -11,7 +11,7 @@ const FULL: &str = r#"{
 "schema": "abbe.gap/1",
 "inputs": {"bags": [{"path": "", "sha256": "", "runs": 0, "samples": 0}], "machine_sha256": ""},
 "noise_floor": [{"channel": "grid.u", "sigma_um": 0.2, "ar": [0.6], "repeats": 3, "reproduced": true,
-  "vibrations": [{"frequency_hz": 47.3, "frequency_half_width_hz": 0.2, "rms_um": 0.21, "runs": 12, "of": 12, "sampled_hz": 250.0,
+  "vibrations": [{"plane": "XY", "frequency_hz": 47.3, "frequency_half_width_hz": 0.2, "rms_um": 0.21, "runs": 12, "of": 12, "sampled_hz": 250.0,
     "period_mm": 0.35, "chance": 1e-9}]}],
 "gap": {"rms_um": 8.1, "p95_um": 14.0, "floor_um": 0.3, "above_floor": true,
   "per_channel": [{"channel": "grid.u", "rms_um": 8.1, "p95_um": 14.0, "floor_um": 0.3, "above_floor": true}]},

@@ -10,8 +10,8 @@ use std::sync::Arc;
 use crate::search::rows::count;
 
 /// Values that the level below or above a line is the median of, at most and at least.
-const BESIDE: usize = 12;
-const FEWEST_BESIDE: usize = 6;
+const NEIGHBOURS: usize = 12;
+const FEWEST_NEIGHBOURS: usize = 6;
 /// Values next to a line that its window smears it over.
 const SMEARED: usize = 3;
 /// First value that is looked at: set-up, slope and slow noise are below.
@@ -117,12 +117,13 @@ impl Spectrum {
     /// The level about a frequency without its line: the greater of what is below it and above it, so that no slope is a line.
     pub(super) fn level(&self, place: usize) -> Option<f64> {
         let below =
-            FIRST.max(place.saturating_sub(SMEARED + BESIDE))..place.saturating_sub(SMEARED);
+            FIRST.max(place.saturating_sub(SMEARED + NEIGHBOURS))..place.saturating_sub(SMEARED);
         let length = self.power.len();
-        let above = (place + SMEARED + 1).min(length)..(place + SMEARED + 1 + BESIDE).min(length);
+        let above =
+            (place + SMEARED + 1).min(length)..(place + SMEARED + 1 + NEIGHBOURS).min(length);
         let of = |range: std::ops::Range<usize>| {
             let values = self.power.get(range)?;
-            (values.len() >= FEWEST_BESIDE).then(|| median(&mut values.to_vec()))
+            (values.len() >= FEWEST_NEIGHBOURS).then(|| median(&mut values.to_vec()))
         };
         let level = of(below)?.max(of(above).unwrap_or(0.0));
         // From the median of a mean of squares to its mean (Wilson and Hilferty).
@@ -140,8 +141,10 @@ impl Spectrum {
     pub(super) fn about(&self, place: usize) -> std::ops::RangeInclusive<usize> {
         let level = self.level(place).unwrap_or(f64::INFINITY);
         let stands_out = |k: &usize| self.power.get(*k).is_some_and(|p| *p > 2.0 * level);
-        let above = (place + 1..=place + BESIDE).take_while(stands_out).last();
-        let least = place.saturating_sub(BESIDE);
+        let above = (place + 1..=place + NEIGHBOURS)
+            .take_while(stands_out)
+            .last();
+        let least = place.saturating_sub(NEIGHBOURS);
         let below = (least..place).rev().take_while(stands_out).last();
         below.unwrap_or(place)..=above.unwrap_or(place)
     }

@@ -12,9 +12,9 @@ use crate::search::rows::count;
 /// How many times its noise (1) a thermometer has moved (2) that explains anything.
 pub(super) const LEAST_MOVED: f64 = 3.0;
 /// Parts of a recording whose means are compared.
-const PARTS: usize = 12;
+const COMPARED_PARTS: usize = 12;
 /// Fewer readings than this are not judged.
-const FEWEST: usize = 24;
+const FEWEST_JUDGED: usize = 24;
 /// Median of the magnitude of a normal variable, inverse.
 const PER_MEDIAN: f64 = 1.4826;
 
@@ -22,7 +22,7 @@ const PER_MEDIAN: f64 = 1.4826;
 pub(super) fn has_moved(degc: &[f64]) -> bool {
     let mut read: Vec<f64> = degc.iter().copied().filter(|t| t.is_finite()).collect();
     read.dedup();
-    if read.len() < FEWEST {
+    if read.len() < FEWEST_JUDGED {
         return read.len() > 1;
     }
     moved_k(&read) >= LEAST_MOVED * noise_k(&read)
@@ -48,7 +48,7 @@ fn noise_k(read: &[f64]) -> f64 {
 /// (2).
 fn moved_k(read: &[f64]) -> f64 {
     let means = read
-        .chunks(read.len().div_ceil(PARTS))
+        .chunks(read.len().div_ceil(COMPARED_PARTS))
         .map(|part| part.iter().sum::<f64>() / count(part.len()));
     let (least, most) = means.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), mean| {
         (low.min(mean), high.max(mean))

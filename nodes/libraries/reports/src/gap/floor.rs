@@ -50,8 +50,12 @@ pub(super) fn section(report: &GapReport) -> Section {
 fn vibrations(floor: &NoiseFloor) -> Vec<String> {
     let channel = in_words(&floor.channel);
     let sentence = |own: &Vibration| {
+        let plane = match own.plane.as_str() {
+            "" => String::new(),
+            plane => format!(" in {plane}"),
+        };
         format!(
-            "Of the noise of {channel}, {} µm, {} µm rms is a vibration of {} in {}; it names no cause. {}",
+            "Of the noise of {channel}{plane}, {} µm, {} µm rms is a vibration of {} in {}; it names no cause. {}",
             three(floor.sigma_um),
             three(own.rms_um),
             frequency(own),
@@ -116,6 +120,7 @@ mod tests {
             repeats: 3,
             reproduced: true,
             vibrations: vec![Vibration {
+                plane: "XY".to_owned(),
                 frequency_hz: 47.31,
                 frequency_half_width_hz: 0.21,
                 rms_um: 0.21,
@@ -131,7 +136,7 @@ mod tests {
         };
         assert_eq!(
             sentence,
-            "Of the noise of the radial readings, 0.340 µm, 0.210 µm rms is a vibration of 47.31 Hz (± 0.21) in all 12 runs; \
+            "Of the noise of the radial readings in XY, 0.340 µm, 0.210 µm rms is a vibration of 47.31 Hz (± 0.21) in all 12 runs; \
              it names no cause. Sampled 250 times a second, it looks like its aliases: 203 Hz, 297 Hz and so on; at the one \
              feed of these runs an error with a period of 0.352 mm does too."
         );
