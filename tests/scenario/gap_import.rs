@@ -124,7 +124,6 @@ fn a_ballbar_shows_squareness_and_backlash_with_their_sizes() {
         said.contains("EC0Y above 0: X+ and Y+ enclose more than 90°"),
         "{said}"
     );
-    assert_eq!(told(&report, "set"), []);
 }
 
 /// Sum of the mean deviations within 1.5 degrees of two angles, µm: of the diameter between them.

@@ -109,14 +109,14 @@ fn taken(json: &Path) -> Option<Value> {
     Some(serde_json::from_str(&text).unwrap())
 }
 
-/// What is named; every name is true.
+/// What is named, or first of a set, as a play is that was measured at one feed; every name is true.
 fn names(report: &Value) -> Vec<String> {
     let is_true = |one: &Value| {
         let pair = ["effect", "axis"].map(|key| one[key].as_str().unwrap());
         TRUE.contains(&pair.into())
     };
     let causes = report["causes"].as_array().unwrap().iter();
-    let named = causes.filter(|cause| cause["status"] == "named");
+    let named = causes.filter(|cause| cause["status"] != "surrogate");
     let name = |cause: &Value| {
         assert!(is_true(cause), "{cause:#}");
         let of = |key: &str| cause[key].as_str().unwrap();
