@@ -13,7 +13,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::slips::{far, slip};
-use super::{drift_mm, is_list, kind, pose};
+use super::{drift_mm, is_list, kind, lists, pose};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::Budget;
 use crate::evaluate::correction::{About, Measured};
@@ -101,6 +101,12 @@ pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section>
         section.figures = json!({
             "test": section.title, "iso230_10_errors": found, "no_verdict_on_size": SIZE_NOT_AT_20_DEGC,
         });
+        if is_list(tests) {
+            let good = found.iter().filter(|one| one.not_evaluated.is_none());
+            let error = |one: &'_ Found| vec![("probing_error", one.probing_error_mm)];
+            let all = good.map(|one| (one.feature.as_str(), error(one)));
+            section.figures["iso230_10_list"] = lists::by_feature(all);
+        }
         section
     })
 }
@@ -329,7 +335,8 @@ fn evaluated(
         },
         probing_error_mm: { result.as_ref() }.map_or(f64::NAN, |one| one.form_error.value_mm),
         probing_error: stated(|one| one.form_error),
-        size_error: stated(|one| one.size_error),
+        // Positions of a list have the ball's radius in them.
+        size_error: stated(|one| one.size_error).filter(|_| !is_list(tests)),
         certificate: certificate.map(|one| one.number.clone().unwrap_or_default()),
         not_evaluated: why,
         has_slip: slip.is_some(),

@@ -1,5 +1,7 @@
 //! Shapes of touches that a control wrote into a list: positions of the ball's centre.
 
+use std::collections::BTreeMap;
+
 use metrology::sample::{FeatureKind, ProbedFeature};
 use serde_json::{Value, json};
 
@@ -59,5 +61,53 @@ const fn name(feature: &ProbedFeature) -> &'static str {
         FeatureKind::Sphere => "sphere",
         FeatureKind::Plane => "plane",
         FeatureKind::Bore | FeatureKind::Boss => "ring or bore",
+    }
+}
+
+/// Name and value in mm of each figure of a feature.
+type Named<'f> = (&'f str, Vec<(&'static str, f64)>);
+
+/// Figures of features by their names, as histories and limits take them; of a feature that was measured again those of the
+/// measurement whose first figure is the greatest.
+pub(super) fn by_feature<'f>(all: impl Iterator<Item = Named<'f>>) -> Value {
+    let mut greatest: BTreeMap<String, Vec<(&str, f64)>> = BTreeMap::new();
+    let first = |figures: &[(&str, f64)]| figures.first().map_or(f64::NAN, |(_, mm)| *mm);
+    for (feature, figures) in all {
+        // Points part the names of a path.
+        let known = greatest.entry(feature.replace('.', "_")).or_default();
+        if known.is_empty() || first(known) < first(&figures) {
+            *known = figures;
+        }
+    }
+    let object = |figures: Vec<(&str, f64)>| -> Value {
+        let quantities = figures.into_iter();
+        quantities
+            .map(|(name, mm)| (name.to_owned(), json!({ "value_mm": mm })))
+            .collect::<serde_json::Map<String, Value>>()
+            .into()
+    };
+    let features = greatest.into_iter();
+    features
+        .map(|(name, figures)| (name, object(figures)))
+        .collect::<serde_json::Map<String, Value>>()
+        .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_greatest_of_several_measurements_stands_for_its_feature() {
+        let all = [
+            ("a.1", vec![("range", 0.002), ("s", 0.001)]),
+            ("b", vec![("range", 0.005)]),
+            ("a.1", vec![("range", 0.003), ("s", 0.0005)]),
+            ("a.1", vec![("range", 0.001), ("s", 0.009)]),
+        ];
+        let found = by_feature(all.into_iter());
+        assert_eq!(found["a_1"]["range"]["value_mm"], 0.003);
+        assert_eq!(found["a_1"]["s"]["value_mm"], 0.0005);
+        assert_eq!(found["b"]["range"]["value_mm"], 0.005);
     }
 }

@@ -12,7 +12,7 @@ use metrology::sample::{FeatureKind, ProbedFeature, TestSegment};
 use serde::Serialize;
 use serde_json::json;
 
-use super::{drift_mm, is_list, kind, pose};
+use super::{drift_mm, is_list, kind, lists, pose};
 use crate::evaluate::Tests;
 use crate::evaluate::budget::Budget;
 use crate::evaluate::imported::Imported;
@@ -71,6 +71,10 @@ pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section>
             ),
         });
         section.figures = json!({ "test": section.title, "iso230_10_location": found });
+        if is_list(tests) {
+            let all = found.iter().map(|one| (one.feature.as_str(), one.named()));
+            section.figures["iso230_10_list"] = lists::by_feature(all);
+        }
         section
     })
 }
@@ -163,6 +167,19 @@ impl Repeats {
             repeatability: result.repeatability,
             axes,
         })
+    }
+
+    /// R along each axis, mm.
+    fn named(&self) -> Vec<(&'static str, f64)> {
+        let parts = self.axes.iter().zip(&self.repeatability);
+        let name = |axis: &Axis| match axis {
+            Axis::X => "location_x",
+            Axis::Y => "location_y",
+            _ => "location_z",
+        };
+        parts
+            .map(|(axis, one)| (name(axis), one.value_mm))
+            .collect()
     }
 
     fn answer(&self) -> String {

@@ -54,6 +54,10 @@ pub(super) fn section(tests: &Tests, budget: Option<&Budget>) -> Option<Section>
             ),
         });
         section.figures = json!({ "test": section.title, "iso230_10_repeatability": spreads });
+        if super::is_list(tests) {
+            let all = spreads.iter().map(|one| (one.feature(), one.named()));
+            section.figures["iso230_10_list"] = super::lists::by_feature(all);
+        }
         section
     })
 }
@@ -138,6 +142,19 @@ impl Spread {
             figure(&self.repeatability, stated),
             um(self.standard_deviation_mm),
             um(self.drift_mm),
+        ]
+    }
+
+    fn feature(&self) -> &str {
+        let name = self.test.rsplit_once(", run ");
+        name.map_or(self.test.as_str(), |(name, _)| name)
+    }
+
+    fn named(&self) -> Vec<(&'static str, f64)> {
+        vec![
+            ("repeatability", self.range_mm),
+            ("standard_deviation", self.standard_deviation_mm),
+            ("drift", self.drift_mm),
         ]
     }
 
