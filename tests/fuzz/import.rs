@@ -92,6 +92,8 @@ pub mod statement;
 pub mod table;
 #[path = "../../nodes/abbe/src/import/times.rs"]
 pub mod times;
+#[path = "../../nodes/abbe/src/import/touch_bag.rs"]
+pub mod touch_bag;
 #[path = "../../nodes/abbe/src/import/touch_shapes.rs"]
 pub mod touch_shapes;
 #[path = "../../nodes/abbe/src/import/touches.rs"]

@@ -157,7 +157,7 @@ pub fn csv_import(data: &[u8]) {
         let mut writer = import::writer::Writer::default();
         let _ = match &map.test {
             import::map::Test::Touches { .. } => {
-                import::touches::write(&runs, &table.features, &mut writer)
+                import::touch_bag::write(&runs, &table.features, &mut writer)
             }
             _ => import::motion::write(&map, &runs, &mut writer),
         };

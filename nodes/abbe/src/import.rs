@@ -69,6 +69,7 @@ mod statement;
 mod table;
 mod times;
 mod titles;
+mod touch_bag;
 mod touch_shapes;
 mod touches;
 mod turned;
@@ -274,7 +275,7 @@ pub(crate) fn import(
 /// Writes the runs of a table; gives their number.
 fn write(map: &Map, (table, runs): (&Table, &Runs), writer: &mut Writer) -> Result<u32> {
     match &map.test {
-        map::Test::Touches { .. } => touches::write(runs, &table.features, writer),
+        map::Test::Touches { .. } => touch_bag::write(runs, &table.features, writer),
         _ => motion::write(map, runs, writer),
     }
 }
@@ -339,6 +340,9 @@ fn plausible(test: &map::Test, machine: &MachineFile, runs: &Runs) -> Result<Vec
 
 /// Asks about deviations that cannot be in the unit that they were read in, where the map does not state it.
 fn doubts(map: &Map, runs: &Runs) -> Vec<String> {
+    if let Some(doubt) = touch_bag::doubt(map, runs) {
+        return vec![doubt];
+    }
     let columns = map.test.columns();
     let is_open = |name: &str| !map.units.contains_key(name);
     // Rows of a positioning test have one shape, whatever their table had.

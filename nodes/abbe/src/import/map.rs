@@ -456,7 +456,7 @@ mod tests {
         assert!(behind.contains(words), "{behind}");
         let before = said(&format!("  axis: X\n  positioning: {{{rest}}}\n"));
         for words in [
-            "must be one of positioning, circle, log",
+            "must be one of positioning, circle, touches, log",
             "the key axis belongs under a step",
             "test.positioning or test.log",
         ] {

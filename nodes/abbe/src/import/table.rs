@@ -103,13 +103,11 @@ impl Table {
         }
         beside::check(map, head, &sheet.lines[at + 1..], &rows)?;
         left_out.extend(measured::check(map, head, &sheet.lines[at + 1..], &rows)?);
-        let features = reader.features;
-        let rows = shapes::shaped(rows, map);
         Ok(Self {
-            rows,
+            rows: shapes::shaped(rows, map),
             left_out,
             odd,
-            features,
+            features: reader.features,
         })
     }
 }

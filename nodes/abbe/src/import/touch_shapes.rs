@@ -17,8 +17,8 @@ const TO_FIND_ONE: usize = 3;
 /// Most touches of one shape: a slip is looked for by leaving out each.
 const MOST_OF_A_SHAPE: usize = 1_000;
 /// Touches of a ring and of a sphere lie at least so far round, deg.
-const LEAST_ARC_DEG: f64 = 120.0;
-const LEAST_CAP_DEG: f64 = 90.0;
+const LEAST_ARC_OF_A_RING_DEG: f64 = 120.0;
+const LEAST_CAP_OF_A_SPHERE_DEG: f64 = 90.0;
 /// A ring nearer to a plane of two axes is in it, rad: its diameter differs by less than 1e-6 of it.
 const IN_PLANE_RAD: f64 = 1e-3;
 /// Part of the scatter along one axis beyond which a place was approached along it.
@@ -90,12 +90,8 @@ pub fn of(points: &[Vector3<f64>]) -> Result<Shape, String> {
     }
     let (across, normal) = spread(points);
     let [length, width, height] = across;
-    let size = format!(
-        "{n} points within {} mm × {} mm × {} mm",
-        number(length),
-        number(width),
-        number(height)
-    );
+    let [long, wide, high] = [length, width, height].map(|mm| number((mm * 1e3).round() / 1e3));
+    let size = format!("{n} points within {long} mm × {wide} mm × {high} mm");
     if n < LEAST_OF_A_RING {
         return Err(format!(
             "{size}: a ring needs {LEAST_OF_A_RING}, a sphere {LEAST_OF_A_SPHERE}, one place {LEAST_OF_A_PLACE} touches"
@@ -192,9 +188,9 @@ fn ring(points: &[Vector3<f64>], normal: Vector3<f64>) -> Result<Shape, String> 
     let around = angles.first().copied().unwrap_or_default() + 360.0
         - angles.last().copied().unwrap_or_default();
     let arc_deg = 360.0 - gaps.fold(around, f64::max);
-    if arc_deg < LEAST_ARC_DEG {
+    if arc_deg < LEAST_ARC_OF_A_RING_DEG {
         return Err(format!(
-            "on an arc of {} deg: at least {LEAST_ARC_DEG} deg",
+            "on an arc of {} deg: at least {LEAST_ARC_OF_A_RING_DEG} deg",
             number(arc_deg.round())
         ));
     }
@@ -217,9 +213,9 @@ fn sphere(points: &[Vector3<f64>]) -> Result<Shape, String> {
     let pairs = pairs.flat_map(|(k, one)| directions[k + 1..].iter().map(move |two| one.dot(two)));
     let least = pairs.fold(1.0_f64, f64::min);
     let cap_deg = least.clamp(-1.0, 1.0).acos().to_degrees();
-    if cap_deg < LEAST_CAP_DEG {
+    if cap_deg < LEAST_CAP_OF_A_SPHERE_DEG {
         return Err(format!(
-            "on a cap of {} deg of a sphere: at least {LEAST_CAP_DEG} deg from one touch to another",
+            "on a cap of {} deg of a sphere: at least {LEAST_CAP_OF_A_SPHERE_DEG} deg from one touch to another",
             number(cap_deg.round())
         ));
     }
@@ -345,7 +341,7 @@ mod tests {
                 vec![Vector3::zeros(); 4],
                 "4 touches of one place: at least 5",
             ),
-            (grid(|_| 0.0), "in one plane, and on no circle"),
+            (grid(|_| 0.0), "in one plane, and no circle is determined"),
             (
                 grid(|k| 5.0 * ((k * 7) % 5) as f64),
                 "in no plane, and on no sphere",

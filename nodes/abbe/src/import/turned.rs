@@ -373,9 +373,10 @@ fn target_name(sheet: &Sheet, targets: &Targets) -> String {
     {
         return name.clone();
     }
-    let unit = lead.find_map(|name| match stated::of(name) {
-        Stated::Unit(_, word) | Stated::Unknown(word) => Some(word),
-        Stated::Nothing => None,
+    let unit = lead.find_map(|name| match (stated::of(name), stated::of_cell(name)) {
+        (Stated::Unit(_, word) | Stated::Unknown(word), _)
+        | (Stated::Nothing, Stated::Unit(_, word)) => Some(word),
+        (Stated::Nothing, _) => None,
     });
     unit.map_or_else(|| "target".to_owned(), |unit| format!("target [{unit}]"))
 }

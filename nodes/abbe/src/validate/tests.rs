@@ -38,7 +38,7 @@ fn every_scenario_and_every_import_map_is_valid() {
     assert!(all.files.len() > 100, "{}", all.files.len());
     let maps = found(&scenarios().join("../tests/import"));
     assert_eq!(maps.mistakes, Vec::<String>::new());
-    assert_eq!(maps.files.len(), 5, "{maps:?}");
+    assert_eq!(maps.files.len(), 6, "{maps:?}");
 }
 
 #[test]

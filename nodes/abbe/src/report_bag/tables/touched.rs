@@ -68,6 +68,8 @@ fn val_spheres_of_a_list_are_those_of_numpy() {
         "{text}"
     );
     assert!(text.contains("R_SPH X "), "{text}");
+    let kept = &found(&report, "iso230_10_list")["sphere 25"];
+    same(&kept["probing_error"]["value_mm"], "/spheres/runs/2/form");
     assert!(
         lines
             .iter()
@@ -113,6 +115,16 @@ fn val_a_bore_of_a_list_in_inches_is_that_of_numpy_in_its_own_plane() {
 }
 
 #[test]
+fn a_list_whose_shapes_are_too_small_for_mm_is_asked_about() {
+    let taken = from_table::of(&root("tests/import/touches_dprnt.txt"), None);
+    let warnings = taken.unwrap().unwrap().warnings().join("\n");
+    assert!(
+        warnings.contains("no diameter above 1.457 mm: are they inches?"),
+        "{warnings}"
+    );
+}
+
+#[test]
 fn val_one_place_touched_again_and_again_is_that_of_numpy() {
     let (report, _) = reported_alone(&root("tests/import/touches_place.txt"));
     let place = &found(&report, "iso230_10_repeatability")[0];
@@ -152,7 +164,7 @@ fn lists_of_nothing_that_is_evaluated_are_refused_with_what_they_are() {
         ),
         (
             rows(|k| [k % 5.0 * 10.0, (k / 5.0).floor() * 10.0, 0.01 * k], 25),
-            "in one plane, and on no circle",
+            "× 0 mm: in one plane, and no circle",
         ),
         (
             rows(|_| [1.0, 2.0, 3.0], 4),
