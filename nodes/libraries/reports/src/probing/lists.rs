@@ -82,7 +82,7 @@ pub(super) fn by_feature<'f>(all: impl Iterator<Item = Named<'f>>) -> Value {
     let object = |figures: Vec<(&str, f64)>| -> Value {
         let quantities = figures.into_iter();
         quantities
-            .map(|(name, mm)| (name.to_owned(), json!({ "value_mm": mm })))
+            .map(|(name, mm)| (name.to_owned(), quantity(mm)))
             .collect::<serde_json::Map<String, Value>>()
             .into()
     };
@@ -91,6 +91,11 @@ pub(super) fn by_feature<'f>(all: impl Iterator<Item = Named<'f>>) -> Value {
         .map(|(name, figures)| (name, object(figures)))
         .collect::<serde_json::Map<String, Value>>()
         .into()
+}
+
+/// A quantity as a history takes it; without a certificate it has no uncertainty.
+fn quantity(value_mm: f64) -> Value {
+    json!({ "value_mm": value_mm, "expanded_uncertainty_mm": null })
 }
 
 #[cfg(test)]
