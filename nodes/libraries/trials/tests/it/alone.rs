@@ -14,6 +14,7 @@
 //! | `instruments` | `clock_drift`, `plate_error`, `length_misalignment`, `interpolation_error` |
 //! | `rotary` | `rotary_location` |
 //! | `scatter` | `latency_jitter`, `stick_slip`; `probe_repeatability` and `vibration_random` that are in the noise floor |
+//! | `in_part` | oil that is used up, a coupling with play, a cable: not of the catalogue, and in part like something in it |
 //!
 //! What the plant lacks, or has only together with something else, is in the README.
 
@@ -28,6 +29,7 @@ mod angles;
 mod classes;
 mod drives;
 mod heat;
+mod in_part;
 mod instruments;
 mod probe;
 mod rotary;

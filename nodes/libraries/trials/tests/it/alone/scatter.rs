@@ -32,7 +32,7 @@ fn a_probe_that_repeats_badly_is_noise_and_no_cause() {
     names_nothing(&told(&[&rig]), "probe_repeatability");
 }
 
-/// A foundation that shakes the tool whatever the axes do.
+/// A foundation that shakes the tool whatever the axes do: part of the noise floor, by its frequency.
 #[test]
 fn a_tool_that_shakes_in_every_run_alike_is_noise_and_no_cause() {
     let mut rig = with_circles();
@@ -42,7 +42,18 @@ fn a_tool_that_shakes_in_every_run_alike_is_noise_and_no_cause() {
         wander_hz: 2.0,
         wander_time_s: 1.0,
     });
-    names_nothing(&told(&[&rig]), "vibration_random");
+    let report = told(&[&rig]);
+    names_nothing(&report, "vibration_random");
+    let floor = report.noise_floor.iter();
+    let seen: Vec<_> = floor.flat_map(|floor| &floor.vibrations).collect();
+    // The plate is read 83 times a second: 43 Hz is seen as 40 Hz.
+    let is_it = |hz: f64| (hz - 43.0).abs() < 1.5;
+    let all = seen
+        .iter()
+        .all(|own| is_it(own.sampled_hz - own.frequency_hz));
+    assert!(all && seen.len() == 2, "{seen:#?}");
+    let planes: Vec<&str> = seen.iter().map(|own| own.plane.as_str()).collect();
+    assert_eq!(planes, ["XY", "ZX"]);
 }
 
 /// A slide on plain guides that breaks away at five times the force at which it slides, on arcs that it runs through without
