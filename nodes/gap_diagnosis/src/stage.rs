@@ -119,8 +119,8 @@ pub enum Output {
     NewEffect {
         /// Id and what it acts on.
         effect: String,
-        /// What these runs cannot tell from it.
-        or: Vec<String>,
+        /// What these runs cannot tell from it, in words behind its name.
+        besides: String,
         /// Parameters with their values.
         size: String,
         /// Probability.
@@ -352,7 +352,7 @@ impl GapDiagnosisStage {
             if self.is_news(&effect, cause) {
                 out.push(Output::NewEffect {
                     effect: effect.clone(),
-                    or: rivals(cause),
+                    besides: rivals(cause),
                     size: size(cause),
                     confidence: cause.confidence,
                 });
@@ -392,18 +392,23 @@ impl GapDiagnosisStage {
     }
 }
 
-/// What these runs cannot tell from a cause.
-fn rivals(cause: &Cause) -> Vec<String> {
-    if cause.status != Status::Set {
-        return vec![];
-    }
+/// What these runs cannot tell from a cause, in words behind its name.
+fn rivals(cause: &Cause) -> String {
     let open = { cause.confusable_with.iter() }.filter(|other| !other.excluded);
-    open.map(|other| {
-        format!("{} {}", other.effect, other.axis)
-            .trim_end()
-            .to_owned()
-    })
-    .collect()
+    let names: Vec<String> = open
+        .map(|other| {
+            format!("{} {}", other.effect, other.axis)
+                .trim_end()
+                .to_owned()
+        })
+        .collect();
+    if cause.status != Status::Set || names.is_empty() {
+        return String::new();
+    }
+    format!(
+        " (or {}, which these runs cannot tell from it)",
+        names.join(", ")
+    )
 }
 
 fn size(cause: &Cause) -> String {

@@ -54,17 +54,10 @@ fn condition(output: &Output) -> Option<Diagnostic> {
     let (level, name, message) = match output {
         Output::NewEffect {
             effect,
-            or,
+            besides,
             size,
             confidence,
         } => {
-            let besides = match &or[..] {
-                [] => String::new(),
-                others => format!(
-                    " (or {}, which these runs cannot tell from it)",
-                    others.join(", ")
-                ),
-            };
             let message =
                 format!("new effect: {effect}{besides}, {size}, confidence {confidence:.2}");
             (Level::Warn, "new_effect", message)
