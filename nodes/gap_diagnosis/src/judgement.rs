@@ -179,10 +179,7 @@ impl CheckId {
     const fn words(self) -> (&'static str, Side) {
         match self {
             Self::OneSize => ("one size under all conditions", Side::Below),
-            Self::OffBounds => (
-                "determined values at an end of their range, time constants of heat apart",
-                Side::AtMost,
-            ),
+            Self::OffBounds => ("determined values at an end of their range", Side::AtMost),
             Self::Curved => ("bend of its curve beside a straight line", Side::AtLeast),
             Self::Begins => (
                 "difference from the same effect begun before the recording",
