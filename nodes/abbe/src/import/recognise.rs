@@ -103,11 +103,18 @@ const LOOKED_AT: usize = 2000;
 const BEGIN: usize = 20_000;
 /// Looks at the cells of a file; `None`: no line of names has rows of numbers below it.
 pub fn of(sheet: &Sheet, decimal: char) -> Option<Recognised> {
-    if let Some(turned) = turned::of(sheet, decimal) {
-        let found = of(&turned.sheet, decimal)?;
-        let odd = turned.odd.or(found.odd);
-        return Some(Recognised { odd, ..found });
+    match turned::of(sheet, decimal) {
+        Some(turned) => {
+            let found = named_columns(&turned.sheet, decimal)?;
+            let odd = turned.odd.or(found.odd);
+            Some(Recognised { odd, ..found })
+        }
+        None => named_columns(sheet, decimal),
     }
+}
+
+/// What the columns below a line of names hold.
+fn named_columns(sheet: &Sheet, decimal: char) -> Option<Recognised> {
     let is_number = |cell: &String| number_of(cell, decimal).is_some() || is_instant(cell);
     let n_numbers = |cells: &[String]| cells.iter().filter(|cell| is_number(cell)).count();
     let n_words = |cells: &[String]| {

@@ -279,7 +279,7 @@ fn rounds(rows: &[Row]) -> Option<Vec<Vec<Row>>> {
             && back_mm < SAME_TO_OTHERS * spacing_mm.fold(f64::INFINITY, f64::min)
     };
     let of = (2..=(n / 2).min(MOST_OF_A_ROUND))
-        .filter(|of| n % of == 0)
+        .filter(|of| n.is_multiple_of(*of))
         .find(is_round)?;
     Some(rows.chunks(of).map(<[Row]>::to_vec).collect())
 }

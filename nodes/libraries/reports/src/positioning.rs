@@ -96,11 +96,7 @@ fn section(tests: &Tests, test: &LinearTest, budget: Option<&Budget>) -> Result<
         TestKind::Diagonal => diagonals::DIAGONAL,
         _ => "Positioning ",
     };
-    let state = if test.compensated {
-        "compensated"
-    } else {
-        "not compensated"
-    };
+    let state = ["not compensated", "compensated"][usize::from(test.compensated)];
     let by = match test.reference {
         _ if nothing_was_read(test) => "nothing was read",
         Reference::Length => "by the length reference",
@@ -136,9 +132,10 @@ fn section(tests: &Tests, test: &LinearTest, budget: Option<&Budget>) -> Result<
             let too_short = too_short(test);
             // A run that was not made to be read at its stops lacks nothing.
             let is_lost = test.targets_mm.is_empty() && too_short.is_none();
-            let why = too_short.or_else(|| without_places(tests, test));
-            let why = why.or_else(|| without_readings(test));
-            let why = why.unwrap_or_else(|| error.to_string());
+            let why = too_short
+                .or_else(|| without_places(tests, test))
+                .or_else(|| without_readings(test))
+                .unwrap_or_else(|| error.to_string());
             if is_lost {
                 section.without_figures(why);
             } else {

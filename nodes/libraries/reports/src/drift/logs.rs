@@ -43,8 +43,9 @@ pub(super) fn section(
         .map(|(at, mm)| ((*at - *from).as_secs_f64(), mm - first_mm))
         .collect();
     let recorded_s = (*to - *from).as_secs_f64();
-    let extent = extent(values.len(), recorded_s, log.cause);
-    section.lines.push(extent);
+    section
+        .lines
+        .push(extent(values.len(), recorded_s, log.cause));
     let mandrel = mandrel_of(log.axis, (budget, during), &mut section);
     let found = evaluated(log, &values, (budget, mandrel));
     section.name_far(&slips::far(&values));

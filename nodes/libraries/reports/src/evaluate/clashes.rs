@@ -68,7 +68,7 @@ impl Clashes {
             self.runs.push((open.run, reason));
         }
         let is_judged = !matches!(segment.kind, TestKind::Positioning | TestKind::Diagonal);
-        self.open = (segment.begin && is_judged).then(|| Open {
+        self.open = (segment.begin && is_judged).then_some(Open {
             run: segment.run,
             n_double: 0,
             n_apart: 0,
