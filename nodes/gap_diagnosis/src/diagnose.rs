@@ -301,9 +301,8 @@ impl<'a> Base<'a> {
         let is_large = gap.rms_um >= LEAST_UNKNOWN * gap.floor_um;
         let flagged = (reproduced || is_large) && before.flagged() && (beside.flagged() || is_left);
         let effects = [found.entries(), scattered.entries()].concat();
-        let mut figures = figures(&stack, &slots, [&before, &beside], &found, &shrunk, config);
-        figures.drifts = follows::drifts(&all, &found);
-        notes.extend(follows::shrinking(&stack, &found));
+        let of = ([&stack, &all], [&before, &beside]);
+        let figures = figures(of, &slots, &found, &shrunk, config);
         let report = GapReport {
             schema: SCHEMA.to_owned(),
             noise_floor: floor::of(self, &inflation, config),
@@ -322,7 +321,7 @@ impl<'a> Base<'a> {
         Diagnosis {
             report,
             figures,
-            notes,
+            notes: follows::with_sign(notes, &stack, &found),
             effects,
             experiments: next.experiments,
         }
@@ -413,11 +412,10 @@ impl<'a> Base<'a> {
     }
 }
 
-/// What the pages draw; `scores` are those of the residual before and beside what is named.
+/// What the pages draw, of the runs that were fitted and of all; `scores` are those of the residual before and beside what is named.
 fn figures(
-    stack: &Stack<'_>,
+    ([stack, all], scores): ([&Stack<'_>; 2], [&Leftover; 2]),
     slots: &[Slot],
-    scores: [&Leftover; 2],
     found: &Found,
     shrunk: &Shrunk,
     config: &GapConfig,
@@ -435,7 +433,7 @@ fn figures(
         held_out: shrunk.held_out.clone(),
         apart: shrunk.apart.clone(),
         share_intervals: share_interval::of_places(stack, slots, before, config),
-        drifts: vec![],
+        drifts: follows::drifts(all, found),
     }
 }
 

@@ -13,14 +13,16 @@
 //! ```
 //!
 //! e is the residual of the readings of one channel, of a plate or ballbar in one plane, evenly sampled; N the number of
-//! frequencies, lengths of segments and channels that are looked at, K the segments that (2) is worth. No slope and no hump of noise that is wider than [`spectrum`]'s neighbours is a
-//! line. Each run has to show it as well, at a chance of [`CHANCE_OF_ONE_RUN`].
+//! frequencies, lengths of segments and channels that are looked at, K the segments that (2) is worth. No slope and no hump of
+//! noise that is wider than [`spectrum`]'s neighbours is a line. Each run has to show it as well, at a chance of
+//! [`CHANCE_OF_ONE_RUN`].
 //!
 //! An error along the path has a frequency at one feed, too, and then one phase in all repeats: (7), with phases about the middle
 //! of the path, is above what random phases reach. Such a line is not reported here.
 //!
-//! It names no cause. Readings slower than ten a second are not looked at. Its amplitude and frequency may wander by the width of the neighbours; where the sampling is slower than
-//! twice the frequency, what is seen is an alias. Of a frequency that wanders farther than that, (6) is the middle: a lower bound.
+//! It names no cause. Readings slower than ten a second are not looked at. Amplitude and frequency may wander by the width of
+//! the neighbours; of a frequency that wanders farther, (6) is the middle: a lower bound. Where the sampling is slower than twice
+//! the frequency, an alias is seen.
 //!
 //! # Agreement
 //! `white_noise_has_no_line`: none in 1,000 seeds. `val_numpy_vibration`: a series of numpy whose amplitude and phase wander

@@ -50,8 +50,13 @@ fn fits(found: &Found) -> impl Iterator<Item = (&str, &ThermalFit)> {
     })
 }
 
-/// A remark for a named growth of the spindle that lifts the nose.
-pub(crate) fn shrinking(stack: &Stack<'_>, found: &Found) -> Option<Note> {
+/// The remarks, with one for a named growth of the spindle that lifts the nose.
+pub(crate) fn with_sign(mut notes: Vec<Note>, stack: &Stack<'_>, found: &Found) -> Vec<Note> {
+    notes.extend(shrinking(stack, found));
+    notes
+}
+
+fn shrinking(stack: &Stack<'_>, found: &Found) -> Option<Note> {
     let mut named = found.named();
     let member = named.find(|member| found.instance(member).kind.id == GROWTH)?;
     let parameters = found.instance(member).kind.parameters.iter();

@@ -56,15 +56,15 @@ pub fn page(title: &str, diagnosed: &Diagnosed, explain: bool) -> Result<Report>
     let simulator = diagnosed.simulated.iter().flat_map(Simulated::in_words);
     let lines = lost.into_iter().chain(simulator).chain(answers);
     let lines: Vec<String> = lines.collect();
-    let mut sections = sections(diagnosed);
-    sections.splice(0..0, logs::sections(report, &figures.drifts)?);
+    let sections = sections(diagnosed);
+    let drifts = logs::sections(report, &figures.drifts)?;
     let notes: Vec<String> = notes(diagnosed);
     let traces = drawings::traces(&figures.traces)?;
     let look_alikes = look_alikes::section(&figures.isolability);
     let parts = explain
         .then(|| Part::of(&why::section(report)))
         .into_iter()
-        .chain(sections.iter().map(Part::of))
+        .chain(drifts.iter().chain(&sections).map(Part::of))
         .chain(look_alikes.as_ref().map(Part::of))
         .chain(remarks(&notes));
     let parts = terminal::apart(parts);
@@ -79,6 +79,7 @@ pub fn page(title: &str, diagnosed: &Diagnosed, explain: bool) -> Result<Report>
         body: html! {
             (heat::style())
             @for line in &lines { p { (line) } }
+            @for section in &drifts { (logs::unfolded(section)) }
             @for section in sections.iter().filter(|one| one.rank < Rank::Detail) { (on_page(section, diagnosed)) }
             (fold("Machine minus simulator, before and after", None, true, &compared))
             (why::folded(report))

@@ -1,11 +1,11 @@
 //! Power spectra of evenly sampled readings, by runs.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
-use std::sync::Arc;
 
 use crate::search::rows::count;
 

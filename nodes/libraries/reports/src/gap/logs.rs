@@ -4,8 +4,10 @@ use anyhow::Result;
 use gap_diagnosis::GoesWith;
 use gap_diagnosis::figures::Drift;
 use gap_diagnosis::report::{Follows, GapReport};
+use maud::{Markup, html};
 
 use super::three;
+use crate::page;
 use crate::plot::{self, Plot, Trace};
 use crate::screen::Tile;
 use crate::section::{Drawing, Section};
@@ -106,6 +108,14 @@ pub(super) fn sections(report: &GapReport, drifts: &[Drift]) -> Result<Vec<Secti
     drifts.iter().map(of).collect()
 }
 
+/// The drawings of a part, unfolded.
+pub(super) fn unfolded(section: &Section) -> Markup {
+    let drawings = section.drawings.iter();
+    let drawings = drawings.map(|drawing| page::figure(&drawing.svg, &drawing.caption));
+    let content = html! { div.traces { @for drawing in drawings { (drawing) } } };
+    page::fold(&section.title, None, true, &content)
+}
+
 /// Label of the axis of time, and its units in an hour.
 fn time_axis(drift: &Drift) -> (String, f64) {
     let last_h = drift.time_h.last().copied().unwrap_or(0.0);
@@ -192,7 +202,7 @@ mod tests {
         );
         let two = Follows {
             share: 0.9999,
-            thermometers: vec![goes_with("rear", 0.93, 0.0), goes_with("table", -3.2, 3.14)],
+            thermometers: vec![goes_with("rear", 0.93, 0.0), goes_with("table", -3.2, 3.12)],
             ..one
         };
         assert_eq!(
