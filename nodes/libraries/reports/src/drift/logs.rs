@@ -15,6 +15,15 @@ use crate::evaluate::thermometer::name_dead;
 use crate::plot::{self, Plot, Trace};
 use crate::section::{Drawing, Rows, Section, head, um};
 
+fn title(log: &DriftLog) -> String {
+    let (axis, height) = (log.axis, at_height(log.height_mm));
+    let cause = in_words(log.cause);
+    format!(
+        "Thermal drift of {axis}{height}, run {}, ISO 230-3: {cause}",
+        log.run
+    )
+}
+
 /// The part of one log; a log that cannot be evaluated says why.
 ///
 /// `during` has the thermometers of the run.
@@ -26,13 +35,7 @@ pub(super) fn section(
     drift: &Drift,
     (budget, during): (Option<&Budget>, &Thermometers),
 ) -> Result<Section> {
-    let mut section = Section::new(format!(
-        "Thermal drift of {}{}, run {}, ISO 230-3: {}",
-        log.axis,
-        at_height(log.height_mm),
-        log.run,
-        in_words(log.cause)
-    ));
+    let mut section = Section::new(title(log));
     let points = &log.displacements.points;
     let (Some((from, first_mm)), Some((to, _))) = (points.first(), points.last()) else {
         section.without_figures("no displacement was read");
