@@ -155,6 +155,18 @@ pub fn n_qualifiers(words: &[String], role: Role) -> usize {
     words.iter().filter(|word| !is_plain(word.as_str())).count()
 }
 
+/// Whether a column without a unit is that of a thermometer: named by a place, with numbers that are degrees Celsius.
+pub fn is_warm(words: &[String], numbers: &[f64]) -> bool {
+    const SENSOR_PLACES: [&str; 14] = [
+        "spindle", "bearing", "ambient", "room", "air", "bed", "column", "nut", "coolant", "table",
+        "raum", "luft", "spindel", "bett",
+    ];
+    let named = words
+        .iter()
+        .any(|word| SENSOR_PLACES.contains(&word.as_str()));
+    named && !numbers.is_empty() && numbers.iter().all(|degc| (-20.0..=150.0).contains(degc))
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::recognise::of_text;

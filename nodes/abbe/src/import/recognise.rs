@@ -307,7 +307,7 @@ fn known(name: &str, below: Stated, lines: &[(u64, &str)], decimal: char) -> Kno
         is_small.then(|| unread::thousands_of_small(cells, decimal))?
     };
     let is_bare = unit.is_none() && unknown.is_none();
-    let is_place = || is_bare && is_numeric && is_warm(&words, &numbers);
+    let is_place = || is_bare && is_numeric && quantities::is_warm(&words, &numbers);
     let role = role.or_else(|| is_place().then_some(Role::Temperature));
     Known {
         name: name.to_owned(),
@@ -335,18 +335,6 @@ fn odd(lines: &[(u64, &str)], decimal: char) -> Option<(u64, String)> {
         |cell: &str| number_of(cell, decimal).is_some() || is_instant(cell) || is_missing(cell);
     let odd = lines.iter().find(|(_, cell)| !is_value(cell));
     odd.map(|(line, cell)| (*line, (*cell).to_owned()))
-}
-
-/// Whether a column without a unit is that of a thermometer: named by a place, with numbers that are degrees Celsius.
-fn is_warm(words: &[String], numbers: &[f64]) -> bool {
-    const SENSOR_PLACES: [&str; 14] = [
-        "spindle", "bearing", "ambient", "room", "air", "bed", "column", "nut", "coolant", "table",
-        "raum", "luft", "spindel", "bett",
-    ];
-    let named = words
-        .iter()
-        .any(|word| SENSOR_PLACES.contains(&word.as_str()));
-    named && !numbers.is_empty() && numbers.iter().all(|degc| (-20.0..=150.0).contains(degc))
 }
 
 /// The words of a name in lower case, and what stands where a unit does: in brackets, or last behind a blank, `/` or `_`.
