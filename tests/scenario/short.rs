@@ -43,7 +43,7 @@ fn reports_of_all_bags_take_forty_lines_and_have_every_part_with_full() {
             22,
             "Positioning tables: scale minus motor: X: ",
         ),
-        ("grid_circles", 200, "Geometric errors of the linear axes: "),
+        ("grid_circles", 202, "Geometric errors of the linear axes: "),
         (
             "host_clocks",
             38,
