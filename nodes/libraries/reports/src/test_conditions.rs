@@ -314,7 +314,7 @@ fn of_recording(
     conditions
 }
 
-/// How long production had run when later tests began; none: there was none between the tests.
+/// How long production had run when later tests began; empty where nothing was produced between the tests.
 fn production_before_later(seen: &TestConditions) -> Option<String> {
     let words = |(run, before_s): &(u32, f64)| {
         format!("{:.0} min in this bag before run {run} on", before_s / 60.0)

@@ -2,7 +2,7 @@
 //!
 //! The recorder writes at its end, into the last file, how many messages it has written in all (`abbe.recording`), and how many of each
 //! topic (`rosbag2`). Topics that were not recorded are in neither. A tool that takes messages out keeps both, so that nothing
-//! else tells of it.
+//! else shows it.
 
 use std::collections::BTreeMap;
 use std::path::Path;

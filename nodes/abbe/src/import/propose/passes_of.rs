@@ -51,7 +51,7 @@ mod tests {
     use super::super::of;
     use super::*;
 
-    /// The units of the columns of a table of passes, and what is said of them.
+    /// The units of the columns of a table of passes, and remarks on them.
     fn units(names: [&str; 4]) -> (Vec<Option<Unit>>, String) {
         let home = tempfile::tempdir().expect("a folder");
         let path = home.path().join("a.csv");
