@@ -9,6 +9,7 @@ mod conditions;
 mod instruments;
 mod odd;
 mod touched;
+mod warned;
 
 const REFERENCE: &str = include_str!("../../../../tests/validation/iso230_tables.json");
 /// Rounding of made-up motions and of sums; a table has steps of 0.01 µm or 0.1″.
