@@ -11,7 +11,7 @@ use rand_pcg::Pcg64Mcg;
 use serde_json::Value;
 use tempfile::TempDir;
 
-const MACHINE: &str = "launch_configs/gap_first/machine.yaml";
+pub(crate) const MACHINE: &str = "launch_configs/gap_first/machine.yaml";
 /// One with thermometers on its spindle.
 const WARM: &str = "launch_configs/first_run/machine.yaml";
 
@@ -21,7 +21,7 @@ fn run(arguments: &[&str]) -> Ended {
     Process::start(command).ended_within(Duration::from_secs(300))
 }
 
-fn shown(path: &Path) -> String {
+pub(crate) fn shown(path: &Path) -> String {
     path.display().to_string()
 }
 
@@ -43,7 +43,7 @@ fn imported(home: &Path, csv: &str, map: &str, machine: &str) -> PathBuf {
 }
 
 /// Imports a table and diagnoses it; the report.
-fn diagnosed(csv: &str, map: &str, machine: &str) -> (Value, String) {
+pub(crate) fn diagnosed(csv: &str, map: &str, machine: &str) -> (Value, String) {
     let home = TempDir::new().unwrap();
     let bag = imported(home.path(), csv, map, machine);
     let report = home.path().join("gap.json");
@@ -60,7 +60,7 @@ fn diagnosed(csv: &str, map: &str, machine: &str) -> (Value, String) {
     (serde_json::from_str(&text).unwrap(), ended.said)
 }
 
-fn causes(report: &Value) -> &[Value] {
+pub(crate) fn causes(report: &Value) -> &[Value] {
     report["causes"].as_array().unwrap()
 }
 
@@ -79,7 +79,7 @@ fn told<'r>(report: &'r Value, status: &str) -> Vec<(&'r str, &'r str, [f64; 3])
 }
 
 /// What could stand in the place of a cause.
-fn instead<'r>(report: &'r Value, effect: &str) -> Vec<&'r str> {
+pub(crate) fn instead<'r>(report: &'r Value, effect: &str) -> Vec<&'r str> {
     let cause = causes(report)
         .iter()
         .find(|cause| cause["effect"] == effect);

@@ -17,6 +17,7 @@ mod design;
 mod diagonals;
 mod five_axis;
 mod fleet_board;
+mod gap_alike;
 mod gap_bad_bags;
 mod gap_first;
 mod gap_import;

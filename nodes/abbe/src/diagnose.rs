@@ -400,6 +400,9 @@ fn beside(
     })
 }
 
+/// What shows from run to run, in the order of their numbers.
+const BY_RUNS: &str = "ambient_drift";
+
 /// The settings without what goes with time, and a remark, where a bag's table was not in the order of the measurement.
 fn without_time(paths: &[PathBuf], config: &GapConfig) -> Result<(GapConfig, Option<String>)> {
     let mut config = config.clone();
@@ -412,14 +415,17 @@ fn without_time(paths: &[PathBuf], config: &GapConfig) -> Result<(GapConfig, Opt
     if unknown.is_empty() {
         return Ok((config, None));
     }
-    let own_time = OWN_TIME.iter().filter(|id| effect(id).is_ok());
+    config.is_order_known = false;
+    let own_time = OWN_TIME
+        .iter()
+        .filter(|id| **id != BY_RUNS && effect(id).is_ok());
     for id in own_time {
         if !config.left_out.iter().any(|known| known == id) {
             config.left_out.push((*id).to_owned());
         }
     }
     let remark = format!(
-        "{}: the table's rows were not in the order of the measurement, so nothing that goes with time or temperature is judged",
+        "{}: the table's rows were not in the order of the measurement, so nothing that goes with time or temperature is judged but a drift from run to run in the order of their numbers",
         listed(&unknown)
     );
     Ok((config, Some(remark)))

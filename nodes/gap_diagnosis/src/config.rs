@@ -42,6 +42,8 @@ pub struct GapConfig {
     pub constancy_spread: f64,
     /// Whether some runs are held out for the shrink.
     pub hold_out: bool,
+    /// Whether the readings are in the order of the measurement.
+    pub is_order_known: bool,
     /// Ids of effects that are not considered.
     pub left_out: Vec<String>,
     /// Rules that are switched off, to see what they are worth.
@@ -66,6 +68,7 @@ impl Default for GapConfig {
             constancy_z: 4.0,
             constancy_spread: 0.1,
             hold_out: true,
+            is_order_known: true,
             left_out: vec![],
             ablated: BTreeSet::new(),
         }

@@ -29,6 +29,7 @@
 
 pub(crate) mod bootstrap;
 pub(crate) mod form_error;
+pub(crate) mod joins;
 pub(crate) mod normal;
 pub(crate) mod pace;
 pub(crate) mod repeats;
@@ -47,6 +48,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use twin::{Channel, Run, Session};
 
 use crate::config::GapConfig;
+use crate::noise::joins::Joins;
 use crate::noise::pace::{Pace, Repeated};
 use crate::noise::repeats::Contrasts;
 use crate::noise::whitener::Autoregression;
@@ -202,7 +204,12 @@ fn of_channel(readings: Readings<'_>, groups: &[Contrasts], config: &GapConfig) 
             difference.filtered(&at_pace.unwrap_or_else(|| within.clone()))
         })
         .collect();
-    let between = amplitudes(&filtered, within.variances[0].sqrt());
+    let mut between = amplitudes(&filtered, within.variances[0].sqrt());
+    let joined: Option<Vec<&Joins>> = groups.iter().map(|group| group.joins.as_ref()).collect();
+    if let Some(joined) = joined {
+        let apart_mm = joins::apart_mm(&joined, within.variances[0].sqrt(), between.place_mm);
+        (between.offset_mm, between.drift_mm) = (apart_mm, apart_mm);
+    }
     let places: Vec<usize> = groups
         .iter()
         .flat_map(|group| group.blocks.clone())
@@ -283,7 +290,7 @@ fn repeated(differences: &[Difference], most: usize, least_mm2: f64) -> Vec<Repe
     paces.into_iter().filter_map(of_pace).collect()
 }
 
-/// What floats between the repeats: the offset where zeros differ; centre and radius of a ballbar.
+/// What floats between the repeats: the offset where zeros differ; centre and radius of a ballbar; offset and drift of runs that join.
 fn open_columns(
     block: &Block,
     group: &Contrasts,
@@ -292,10 +299,12 @@ fn open_columns(
 ) -> DMatrix<f64> {
     let floats = |kind: &Mode| match kind {
         Mode::Offset => {
-            (!group.one_zero && group.blocks.len() > 1) || block.channel == Channel::Radial
+            (!group.one_zero && group.blocks.len() > 1)
+                || block.channel == Channel::Radial
+                || group.joins.is_some()
         }
         Mode::Place(k) => *k == 1 && block.channel == Channel::Radial,
-        Mode::Drift => false,
+        Mode::Drift => group.joins.is_some(),
     };
     let open: Vec<usize> = (0..kinds.len()).filter(|k| floats(&kinds[*k])).collect();
     modes.select_columns(&open)

@@ -17,12 +17,12 @@ use crate::judgement::aside;
 use crate::judgement::by_clock;
 use crate::judgement::by_thermometer;
 use crate::judgement::form_doubt;
-use crate::judgement::plain::plainest;
+use crate::judgement::plain::{plainest, straightened};
 use crate::judgement::rule::Rule;
 use crate::judgement::unknown::{self, Leftover};
 use crate::judgement::veto::{self, Veto};
 use crate::judgement::{self, Check, CheckId};
-use crate::judgement::{one_feed, unresolved};
+use crate::judgement::{in_course, one_feed, one_plane, unresolved};
 use crate::noise::Noise;
 use crate::noise::normal::Normal;
 use crate::noise::stack::Stack;
@@ -170,7 +170,9 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     by_thermometer::check(scope, &signatures, &mut members, &thermometers);
     unresolved::list_periodic(stack, &signatures, &mut members);
     one_feed::list(stack, &signatures, &mut members);
+    one_plane::list(stack, &signatures, &mut members);
     by_clock::list_drift(stack, &signatures, &mut members);
+    in_course::list(stack, &signatures, &mut members, scope.config);
     resize(stack, &signatures, &normal, &mut members);
     while leave_out_small(stack, &signatures, &mut members) {
         resize(stack, &signatures, &normal, &mut members);
@@ -297,6 +299,7 @@ fn search(scope: &Scope<'_, '_>, signatures: &Library, normal: &Normal) -> Best 
     });
     search.alternatives(&set, 8);
     let set = plainest(signatures, &search.visited, set);
+    let set = straightened(signatures, set, |set| search.score(set));
     let sizes = search.fit(&set).sizes;
     let forms: Vec<&Form> = set.iter().map(|form| &signatures.forms[*form]).collect();
     let refit = refit::joint(stack, signatures, &forms, &sizes);

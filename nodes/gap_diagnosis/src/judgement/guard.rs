@@ -25,7 +25,8 @@
 //! passing for noise; products are clipped at three standard deviations.
 //!
 //! # Holds when
-//! A channel has twenty rows more than its models have terms; others are not judged.
+//! A channel has twenty rows more than its models have terms; others are not judged. Nor is one whose runs all repeat one test at
+//! targets: the noise of its repeats is all that it has.
 //!
 //! # References
 //! \[1\] P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed., Wiley 2009, 5.1 (scale by the median).
@@ -89,7 +90,7 @@ pub fn inflation(
     for (channel, blocks) in sums {
         let n = count(blocks.iter().map(|(block, _)| block.rows.len()).sum());
         let left = n - terms.get(&channel).copied().unwrap_or(0.0);
-        if left <= FEWEST {
+        if left <= FEWEST || is_all_repeated(stack, &channel) {
             continue;
         }
         let doubt = (OF_MEDIAN / left + 2.0 / noise[&channel].freedom.max(1.0)).sqrt();
@@ -117,6 +118,18 @@ pub fn inflation(
         (channel.clone(), worse.max(1.0)) // (2)
     };
     scales.iter().map(judged).collect()
+}
+
+/// Whether all runs of a channel repeat one test at targets: their differences have all of its noise, and what stays alike in all is
+/// structure.
+fn is_all_repeated(stack: &Stack<'_>, channel: &Channel) -> bool {
+    let block = |place: &usize| &stack.rows.blocks[*place];
+    let groups = repeats::groups(stack.session, &stack.rows);
+    let mut own = { groups.iter() }.filter(|group| block(&group[0]).channel == *channel);
+    let is_at_targets = |place: &usize| stack.session.runs[block(place).run].segment.stations > 0;
+    let first = own.next();
+    first.is_some_and(|group| group.len() > 1 && group.iter().all(is_at_targets))
+        && own.next().is_none()
 }
 
 /// (1) of some blocks' rows.

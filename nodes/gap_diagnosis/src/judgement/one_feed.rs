@@ -25,7 +25,7 @@
 //!   |U'f| / |f| >= 0.95                                                   (3)
 //! ```
 //!
-//! it reads as a play that wears along the axis, with which it is listed.
+//! it reads as a play that wears along the axis, with which it is listed, and at one feed with a lost motion that depends on it.
 //!
 //! # Holds when
 //! Feeds are steady between the turns. Of readings at rest (1) takes the feed at which the axis came there, (2) zero.
@@ -74,15 +74,20 @@ pub(crate) fn list(stack: &Stack<'_>, signatures: &Library, members: &mut [Membe
             continue;
         }
         let values = &member.estimate.values;
-        let rival = match instance.kind.id {
-            PLAY => is_of_one_feed(stack, instance, values).then_some((FEED_LOST_MOTION, 1.0)),
-            FEED_LOST_MOTION => {
-                is_gone_between_turns(stack, instance, values).then_some((SPIKE, 1.0))
+        let has_one_feed = || is_of_one_feed(stack, instance, values);
+        let rivals = match instance.kind.id {
+            PLAY if has_one_feed() => vec![(FEED_LOST_MOTION, 1.0)],
+            FEED_LOST_MOTION if is_gone_between_turns(stack, instance, values) => {
+                vec![(SPIKE, 1.0)]
             }
-            WIND_UP => cosine_of_play(stack, instance, values).map(|cos| (PLAY, cos)),
-            _ => None,
+            WIND_UP => match cosine_of_play(stack, instance, values) {
+                Some(cos) if has_one_feed() => vec![(FEED_LOST_MOTION, cos), (PLAY, cos)],
+                Some(cos) => vec![(PLAY, cos)],
+                None => vec![],
+            },
+            _ => vec![],
         };
-        if let Some((rival, cos)) = rival {
+        for (rival, cos) in rivals {
             unresolved::list(member, rival, &axis.to_string(), cos);
         }
     }

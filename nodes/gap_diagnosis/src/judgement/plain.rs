@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::search::selection::Set;
+use crate::search::selection::{Set, with};
 use crate::search::signature::Library;
 
 /// Errors that an axis or a probe has by itself, the first before the others.
@@ -41,6 +41,48 @@ pub fn plainest(signatures: &Library, visited: &BTreeMap<Set, f64>, best: Set) -
             && plain < rank(signatures, member)
         {
             now.clone_from(set);
+        }
+    }
+    now
+}
+
+/// Curves, and the lines that each may be taken for where only a part of a travel was read.
+const CURVES: [(&str, &[&str]); 2] = [
+    ("pitch_error", &["scale_error"]),
+    ("straightness", &["squareness"]),
+];
+
+/// The set with each curve replaced by a line that does as well in its place: the search may never have come by the line, for a curve
+/// with more amplitudes is better by more than the first of them.
+pub fn straightened(signatures: &Library, best: Set, mut score: impl FnMut(&Set) -> f64) -> Set {
+    let id = |form: usize| {
+        signatures.instances[signatures.forms[form].instance]
+            .kind
+            .id
+    };
+    let mut now = best;
+    for member in now.clone() {
+        let Some((_, lines)) = CURVES.iter().find(|(curve, _)| *curve == id(member)) else {
+            continue;
+        };
+        let others: Vec<usize> = now.iter().copied().filter(|form| *form != member).collect();
+        let taken = |form: usize| {
+            let instance = signatures.forms[form].instance;
+            others
+                .iter()
+                .any(|other| signatures.forms[*other].instance == instance)
+        };
+        let plain = (0..signatures.forms.len()).filter(|form| {
+            !signatures.forms[*form].wide && lines.contains(&id(*form)) && !taken(*form)
+        });
+        let straight = plain
+            .map(|form| with(&others, form))
+            .map(|set| (score(&set), set));
+        let first = straight.min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((line, set)) = first
+            && line <= score(&now) + TIE
+        {
+            now = set;
         }
     }
     now
@@ -119,5 +161,16 @@ mod tests {
         let library = library();
         let visited = BTreeMap::from([(vec![0, 1], 10.0), (vec![1, 3], 9.5), (vec![2], 9.5)]);
         assert_eq!(plainest(&library, &visited, vec![0, 1]), [0, 1]);
+    }
+
+    #[test]
+    fn a_curve_gives_way_to_a_line_that_does_as_well_and_to_none_that_is_worse() {
+        let mut library = library();
+        library.instances[0].kind = effects::kind("pitch_error").unwrap();
+        let scores = |line: f64| move |set: &Set| if set.contains(&2) { line } else { 10.0 };
+        assert_eq!(straightened(&library, vec![0, 1], scores(11.5)), [1, 2]);
+        assert_eq!(straightened(&library, vec![0, 1], scores(12.5)), [0, 1]);
+        // A scale error that is in the set already leaves the curve as it is.
+        assert_eq!(straightened(&library, vec![0, 2], scores(0.0)), [0, 2]);
     }
 }

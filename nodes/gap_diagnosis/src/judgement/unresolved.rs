@@ -201,7 +201,7 @@ fn is_seen(wave: &DVector<f64>) -> bool {
 }
 
 /// A function of an axis' place over the rows, whitened.
-fn column(stack: &Stack<'_>, axis: Axis, of: impl Fn(f64) -> f64) -> DVector<f64> {
+pub(crate) fn column(stack: &Stack<'_>, axis: Axis, of: impl Fn(f64) -> f64) -> DVector<f64> {
     let mut column = vec![0.0; stack.rows.len];
     for block in &stack.rows.blocks {
         let run = &stack.session.runs[block.run];

@@ -469,10 +469,15 @@ fn railed(instance: &Instance, estimate: &Estimate, best: &Best, member: usize) 
                 !is_end && !parameter.name.ends_with(LAG) && told > SAME_SIGNATURE
             }
         };
-        estimate.at_bound[place] && estimate.values[place] != 0.0 && is_told()
+        let is_open = OPEN_BELOW.contains(&parameter.name)
+            && estimate.values[place] < parameter.low.midpoint(parameter.high);
+        estimate.at_bound[place] && estimate.values[place] != 0.0 && !is_open && is_told()
     };
     active.filter(is_railed).count()
 }
+
+/// Shapes that may be at their lower end: the friction of a drive that turns over at once is friction.
+const OPEN_BELOW: [&str; 1] = ["length_mm"];
 
 /// End of the names of time constants of heat.
 const LAG: &str = "_min";

@@ -26,6 +26,7 @@ use metrology::{Axis, PerAxis};
 use nalgebra::DVector;
 use twin::{Channel, Run, Session, Touch};
 
+use crate::noise::joins::Joins;
 use crate::search::nuisance::orthonormal;
 use crate::search::rows::{Block, Row, Rows, Station, count, position, time_s};
 use crate::session::log;
@@ -41,6 +42,8 @@ pub struct Contrasts {
     pub values: Vec<Vec<f64>>,
     /// Whether all repeats share one zero, so that their offsets mean something.
     pub one_zero: bool,
+    /// How the repeats join, where they are runs at targets made one after another.
+    pub joins: Option<Joins>,
 }
 
 /// Places of the blocks that repeat each other; a block without a repeat is a group of its own.
@@ -193,6 +196,7 @@ fn runs_between(
     (!values.is_empty()).then(|| Contrasts {
         blocks: group.to_vec(),
         rows: places[0].clone(),
+        joins: Joins::new(session, blocks, &places, residual, steps),
         values,
         one_zero: have_one_zero(session, blocks),
     })
@@ -254,6 +258,7 @@ fn log_between(
         rows,
         values,
         one_zero: have_one_zero(session, &logs),
+        joins: None,
     })
 }
 
@@ -328,6 +333,7 @@ fn touches_between(run: &Run, place: usize, block: &Block, residual: &[f64]) -> 
             rows: vec![rows[0]],
             values,
             one_zero: false,
+            joins: None,
         }
     };
     same.into_values()

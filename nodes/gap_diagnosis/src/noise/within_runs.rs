@@ -45,6 +45,7 @@ pub(super) fn noise(
                 rows: (0..block.rows.len()).collect(),
                 values: vec![raw[block.range()].to_vec()],
                 one_zero: false,
+                joins: None,
             }
         };
         let groups: Vec<Contrasts> = places.iter().map(single).collect();

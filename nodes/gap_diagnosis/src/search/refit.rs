@@ -10,7 +10,15 @@
 //!   cov = (J'J)^-1 (sum_r J_r' e_r e_r' J_r) (J'J)^-1, clusters r = runs  (2)
 //! ```
 //!
-//! The interval takes the greater of (2) and (J'J)^-1, for few clusters make (2) too small.
+//! The interval takes the greater of (2) and (J'J)^-1, for few clusters make (2) too small. In these intervals a shape whose
+//! places on the grid have ends a and b, one step beyond its outer ones, has what physics knows of it,
+//!
+//! ```text
+//!   J'J + 1/u_0^2,   u_0 = v min(ln(b / a) / sqrt 12, ln 2)               (3)
+//! ```
+//!
+//! so that the size of a spike that is too quick for the readings is stated for the widths that machines have. Beyond a factor of
+//! two an interval of a line about v means nothing.
 //!
 //! # References
 //! \[1\] H. White, Econometrica 48, 1980; K.-Y. Liang, S. L. Zeger, Biometrika 73, 1986 (the sandwich).
@@ -375,7 +383,8 @@ fn estimates(stack: &Stack<'_>, members: &[Member<'_>], parts: Vec<DVector<f64>>
     let spread = if columns.is_empty() {
         vec![]
     } else {
-        standard_uncertainties(stack, &DMatrix::from_columns(&columns), &left)
+        let known = known_of_shapes(members);
+        uncertainties(stack, &DMatrix::from_columns(&columns), &left, &known)
     };
     let mut of_whole = of_wholes(stack, members, &columns, &left).into_iter();
     let mut spread = spread.into_iter();
@@ -414,13 +423,48 @@ fn estimates(stack: &Stack<'_>, members: &[Member<'_>], parts: Vec<DVector<f64>>
     }
 }
 
+/// Of (3): a shape that is hardly known is known to a factor of two.
+const LARGEST_RELATIVE_U: f64 = std::f64::consts::LN_2;
+
+/// 1/u_0^2 of (3) of every active value, in the order of members; 0 of a size.
+fn known_of_shapes(members: &[Member<'_>]) -> Vec<f64> {
+    let of = |member: &Member<'_>, place: usize| {
+        let grid = parameter(member.instance, place).role.grid()?;
+        let ([first, second, ..], [.., before, last]) = (grid, grid) else {
+            return None;
+        };
+        let at = member.values[place];
+        let range = last.powi(2) / before / (first.powi(2) / second);
+        let u = at * (range.ln() / 12_f64.sqrt()).min(LARGEST_RELATIVE_U);
+        (*first > 0.0 && at > 0.0).then(|| u.powi(-2))
+    };
+    let all = members.iter().flat_map(|member| {
+        let places = member.active.iter();
+        places.map(move |place| of(member, *place).unwrap_or(0.0))
+    });
+    all.collect()
+}
+
 /// Greater of the sandwich by run and of the model, for each column.
 pub fn standard_uncertainties(
     stack: &Stack<'_>,
     columns: &DMatrix<f64>,
     left: &DVector<f64>,
 ) -> Vec<f64> {
-    let normal = Normal::new(columns, left);
+    uncertainties(stack, columns, left, &vec![0.0; columns.ncols()])
+}
+
+/// The same where so much is known of each column besides.
+fn uncertainties(
+    stack: &Stack<'_>,
+    columns: &DMatrix<f64>,
+    left: &DVector<f64>,
+    known: &[f64],
+) -> Vec<f64> {
+    let mut normal = Normal::new(columns, left);
+    for (place, known) in known.iter().enumerate() {
+        normal.gram[(place, place)] += known;
+    }
     let inverse = normal.inverse(&(0..columns.ncols()).collect::<Vec<_>>());
     let mut scores = vec![DVector::<f64>::zeros(columns.ncols()); stack.runs.len()];
     for block in &stack.rows.blocks {
@@ -441,4 +485,35 @@ pub fn standard_uncertainties(
     (0..columns.ncols())
         .map(|k| inverse[(k, k)].max(sandwich[(k, k)]).max(0.0).sqrt())
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use metrology::Axis;
+    use twin::effects::{self, Target};
+
+    use super::*;
+
+    /// By hand: the grid of widths goes from 3 to 48 ms, one step beyond it from 1.5 to 96; ln 64 / sqrt 12 = 1.20 is more than ln 2.
+    #[test]
+    fn eq3_a_width_is_known_to_a_factor_of_two_and_a_height_not_at_all() {
+        let instance = Instance {
+            kind: effects::kind("reversal_spike").expect("in the catalogue"),
+            target: Target::Axis(Axis::X),
+            begins: None,
+        };
+        let member = Member {
+            instance: &instance,
+            values: vec![5.0, 20.0, 0.01],
+            active: vec![0, 1],
+        };
+        let [height, width] = known_of_shapes(&[member])[..] else {
+            panic!("two values");
+        };
+        assert!(height.abs() < 1e-12, "{height}");
+        assert!(
+            (width.sqrt().recip() - 20.0 * 2.0_f64.ln()).abs() < 1e-9,
+            "{width}"
+        );
+    }
 }

@@ -230,8 +230,45 @@ impl<'l> Search<'l> {
             .take(most)
             .map(|forms| self.best_sound(set, forms))
             .collect();
+        scored.extend(self.curves_with_slopes(set));
         scored.sort_by(|a, b| a.0.total_cmp(&b.0));
         scored
+    }
+
+    /// The best form of each curve through targets together with its slope: neither alone may be worth a step where an error of any
+    /// form has both.
+    fn curves_with_slopes(&mut self, set: &Set) -> Vec<(f64, Set)> {
+        let instance = |form: &usize| self.signatures.forms[*form].instance;
+        let taken: BTreeSet<usize> = set.iter().map(instance).collect();
+        let open = self.signatures.curves.difference(&taken).copied();
+        let pairs: Vec<(usize, Set)> = open
+            .filter_map(|curve| {
+                let slope = self.signatures.slope_of(curve)?;
+                let is_open = !taken.contains(&instance(&slope));
+                is_open.then(|| (curve, with(set, slope)))
+            })
+            .collect();
+        let of_pair = |(curve, beside): (usize, Set)| {
+            let forms: Vec<usize> = (0..self.signatures.forms.len())
+                .filter(|form| self.signatures.forms[*form].instance == curve)
+                .collect();
+            let groups = forms
+                .iter()
+                .map(|form| &self.signatures.forms[*form].columns[..]);
+            let gains = self.normal.gains_beside(&self.columns(&beside), groups);
+            let worth = |(form, gain): (usize, f64)| {
+                let price = count(self.signatures.forms[form].price) * self.log_rows;
+                (gain - price, form)
+            };
+            let mut ranked: Vec<(f64, usize)> = forms.into_iter().zip(gains).map(worth).collect();
+            ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+            (beside, ranked)
+        };
+        let ranked: Vec<(Set, Vec<(f64, usize)>)> = pairs.into_iter().map(of_pair).collect();
+        let ranked = ranked.into_iter().filter(|(_, forms)| !forms.is_empty());
+        ranked
+            .map(|(beside, forms)| self.best_sound(&beside, &forms))
+            .collect()
     }
 
     /// The first of some forms of an instance, the best first, whose sizes beside a set physics lets be. A wide form that

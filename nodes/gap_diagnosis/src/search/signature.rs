@@ -178,6 +178,8 @@ pub struct Library {
 const MOST_SHAPES: usize = 24;
 /// An effect that would stay below this D at its greatest physical size is not excited.
 pub const MIN_D_EXCITED: f64 = 6.0;
+/// The slope of a position error along an axis.
+const SLOPE: &str = "scale_error";
 
 impl Library {
     /// Signatures of some instances on a stack.
@@ -197,6 +199,15 @@ impl Library {
             }
         }
         signatures
+    }
+
+    /// The plain form of the slope of a curve along an axis: the scale of that axis.
+    pub fn slope_of(&self, curve: usize) -> Option<usize> {
+        let target = &self.instances[curve].target;
+        (0..self.forms.len()).find(|form| {
+            let own = &self.instances[self.forms[*form].instance];
+            own.kind.id == SLOPE && own.target == *target && !self.forms[*form].wide
+        })
     }
 
     /// Adds one form and gives its place; a form that stays below [`MIN_D_EXCITED`] at its greatest size is left out, and one of a

@@ -112,11 +112,14 @@ pub fn axis_at_targets(stack: &Stack<'_>, instance: &Instance) -> Option<Axis> {
 }
 
 /// Free amplitudes that only targets along the whole curve tell apart: circles and paths are over a part of it.
-const AT_TARGETS_ALONE: [&str; 4] = [
+const AT_TARGETS_ALONE: [&str; 7] = [
     "free_by_place3_um",
     "free_by_place4_um",
     "free_by_place5_um",
     "free_by_place6_um",
+    "free_in_1_min_um",
+    "free_in_4_min_um",
+    "free_in_16_min_um",
 ];
 
 /// An effect, and the first part of the names of its free amplitudes that only targets determine. On paths its feeds determine it.
@@ -143,16 +146,38 @@ pub fn widen_curves(stack: &Stack<'_>, signatures: &mut Library) {
         let kind = signatures.instances[instance].kind;
         let values = vec![0.0; kind.parameters.len() + kind.free.len()];
         let values = through_targets(stack, &signatures.instances[instance], values);
+        // Its plain form over the whole travel is a line over a part of it, and would stand for the slope.
+        signatures.forms.retain(|form| form.instance != instance);
         added.extend(signatures.add(stack, instance, values, true));
         signatures.curves.insert(instance);
     }
     if added.is_empty() {
         return;
     }
+    // Places of forms have moved.
+    let added: Vec<usize> = (0..signatures.forms.len())
+        .filter(|form| {
+            signatures
+                .curves
+                .contains(&signatures.forms[*form].instance)
+        })
+        .collect();
     let normal = signatures.normal(&stack.z);
     let log_rows = stack.freedom().ln();
     for wide in added {
-        add_parts(signatures, &normal, &[], wide, (log_rows, MOST_OF_CURVE));
+        let form = &signatures.forms[wide];
+        let (curve, kind) = (form.instance, signatures.instances[form.instance].kind);
+        let plain: Vec<usize> = (0..form.amplitudes.len())
+            .filter(|k| form.amplitudes[*k] < kind.parameters.len())
+            .collect();
+        if !plain.is_empty() {
+            signatures.add_part(wide, &plain);
+        }
+        // A curve has no slope: its parts are chosen beside that of the scale, and alone.
+        let slope: Vec<usize> = signatures.slope_of(curve).into_iter().collect();
+        for beside in [&slope[..], &[]] {
+            add_parts(signatures, &normal, beside, wide, (log_rows, MOST_OF_CURVE));
+        }
     }
 }
 

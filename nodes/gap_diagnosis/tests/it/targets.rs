@@ -31,6 +31,12 @@ struct Plant {
     /// What the lost motion has more in the middle than at both ends.
     worn_mm: f64,
     rate_mm_per_s: f64,
+    /// A set-up that settles by so much, to half of it after so many seconds.
+    settles: [f64; 2],
+    /// Standard deviation of what runs are apart.
+    apart_mm: f64,
+    /// What this run is off by.
+    off_mm: f64,
     runs: u32,
     targets_mm: Vec<f64>,
     random: Pcg64Mcg,
@@ -61,6 +67,9 @@ impl Plant {
             lost_mm: random.random_range(3e-3..20e-3),
             worn_mm: 0.0,
             rate_mm_per_s: 0.0,
+            settles: [0.0, 1.0],
+            apart_mm: 0.0,
+            off_mm: 0.0,
             runs: 5,
             targets_mm,
             random,
@@ -103,9 +112,11 @@ impl Plant {
 
     fn reading_mm(&mut self, at_mm: f64, sense: f64, millis: i64) -> f64 {
         let noise: f64 = self.random.sample(StandardNormal);
-        let drifted_mm = self.rate_mm_per_s * 1e-3 * millis as f64;
+        let at_s = 1e-3 * millis as f64;
+        let [settles_mm, half_s] = self.settles;
+        let drifted_mm = self.rate_mm_per_s * at_s + settles_mm * at_s / (at_s + half_s);
         let read_mm = at_mm + self.lead_mm(at_mm) - 0.5 * sense * self.play_mm(at_mm);
-        read_mm + drifted_mm + 0.2e-3 * noise
+        read_mm + drifted_mm + self.off_mm + 0.2e-3 * noise
     }
 }
 
@@ -181,6 +192,10 @@ impl Table {
 }
 
 fn measured(plant: &mut Plant) -> Diagnosis {
+    measured_with(plant, &GapConfig::default())
+}
+
+fn measured_with(plant: &mut Plant, config: &GapConfig) -> Diagnosis {
     let machine = machine();
     let targets_mm = plant.targets_mm.clone();
     let mut table = Table {
@@ -189,6 +204,10 @@ fn measured(plant: &mut Plant) -> Diagnosis {
         x_mm: targets_mm[0] - 5.0,
     };
     for run in 1..=plant.runs {
+        if plant.apart_mm > 0.0 {
+            let apart: f64 = plant.random.sample(StandardNormal);
+            plant.off_mm = plant.apart_mm * apart;
+        }
         table.rest(200);
         table.segment(run, true, 2 * targets_mm.len());
         table.go(targets_mm[0] - 5.0);
@@ -207,7 +226,7 @@ fn measured(plant: &mut Plant) -> Diagnosis {
     }
     let (session, account) = table.builder.finish().expect("a session");
     assert_eq!(account.runs, plant.runs as usize, "{account:?}");
-    diagnose(&machine, &session, &GapConfig::default()).expect("a diagnosis")
+    diagnose(&machine, &session, config).expect("a diagnosis")
 }
 
 fn is_named(cause: &&Cause) -> bool {
@@ -355,4 +374,80 @@ fn a_drift_and_a_worn_screw_are_found_beside_a_large_lead_error() {
         assert!((from_um - 16.0).abs() < 3.0, "{from_um}");
         assert!((to_um - 34.0).abs() < 4.0, "{to_um}");
     }
+}
+
+/// Whether a slow drift of X is named.
+fn drifts(diagnosis: &Diagnosis) -> bool {
+    let mut named = diagnosis.report.causes.iter().filter(is_named);
+    named.any(|cause| (cause.effect.as_str(), cause.axis.as_str()) == ("ambient_drift", "X"))
+}
+
+/// A set-up that settles, by a law that no effect has: to half of 12 µm within a run.
+#[test]
+fn a_drift_that_settles_is_named_in_three_runs_and_in_five() {
+    for runs in [3, 5] {
+        let mut found = 0;
+        for seed in 0..12 {
+            let settling = Plant {
+                runs,
+                settles: [12e-3, 60.0],
+                ..Plant::drawn(seed)
+            };
+            found += usize::from(drifts(&measured(&mut { settling })));
+        }
+        assert!(found >= 10, "{found} of 12 with {runs} runs");
+    }
+}
+
+#[test]
+fn runs_that_are_apart_without_a_course_are_no_drift() {
+    for runs in [2, 3, 4, 5] {
+        let named = (0..25).filter(|seed| {
+            let apart = Plant {
+                runs,
+                apart_mm: 1e-3,
+                ..Plant::drawn(*seed)
+            };
+            drifts(&measured(&mut { apart }))
+        });
+        let named = named.count();
+        assert!(named <= 1, "{named} of 25 with {runs} runs");
+    }
+}
+
+#[test]
+fn errors_of_the_place_may_be_a_drift_where_the_order_is_not_known() {
+    let config = GapConfig {
+        is_order_known: false,
+        ..GapConfig::default()
+    };
+    let mut found = 0;
+    for seed in 0..8 {
+        let diagnosis = measured_with(&mut Plant::drawn(seed), &config);
+        for cause in diagnosis.report.causes.iter().filter(is_named) {
+            let of_place = ["scale_error", "pitch_error"].contains(&&*cause.effect);
+            let mut open = cause.confusable_with.iter().filter(|it| !it.excluded);
+            let lists = open.any(|other| other.effect == "ambient_drift");
+            assert_eq!(lists, of_place, "{seed}: {cause:?}");
+            found += usize::from(of_place);
+        }
+    }
+    assert!(found >= 6, "{found}");
+}
+
+/// Targets that are each off by an amount of its own are no curve: the lost motion beside them is named all the same.
+#[test]
+fn a_lost_motion_beside_errors_without_a_form_is_named_where_every_run_is_a_repeat() {
+    let mut found = 0;
+    for seed in 0..8 {
+        let mut plant = Plant::drawn(seed);
+        plant.targets_mm = (0..31).map(|k| -270.0 + 18.0 * f64::from(k)).collect();
+        // Waves of less than three targets.
+        plant.waves = vec![[0.4e-3, TAU / 41.0, 0.4], [0.3e-3, TAU / 47.0, 1.9]];
+        (plant.lost_mm, plant.runs) = (12e-3, 3);
+        let diagnosis = measured(&mut plant);
+        let mut named = diagnosis.report.causes.iter().filter(is_named);
+        found += usize::from(named.any(|cause| cause.effect == "backlash"));
+    }
+    assert!(found >= 7, "{found} of 8");
 }

@@ -19,10 +19,13 @@ pub const RANGES: &[(&str, &[Row])] = &[
     (
         "ambient_drift",
         &[
-            ("rate_um_per_h", -200.0, 200.0),
+            ("rate_um_per_h", -1000.0, 1000.0),
             ("free_square_um_per_h2", -200.0, 200.0),
             ("free_cube_um_per_h3", -200.0, 200.0),
             ("free_air_um_per_k", -50.0, 50.0),
+            ("free_in_1_min_um", -100.0, 100.0),
+            ("free_in_4_min_um", -100.0, 100.0),
+            ("free_in_16_min_um", -100.0, 100.0),
         ],
     ),
     (
@@ -290,7 +293,7 @@ pub const RANGES: &[(&str, &[Row])] = &[
     (
         "reversal_spike",
         &[
-            ("height_um", -30.0, 30.0),
+            ("height_um", -100.0, 100.0),
             ("width_ms", 0.5, 200.0),
             ("length_mm", 0.0001, 3.0),
             ("free_at_100mm_s2_um", -30.0, 30.0),
@@ -324,7 +327,7 @@ pub const RANGES: &[(&str, &[Row])] = &[
     (
         "scale_error",
         &[
-            ("scale_um_per_m", -200.0, 200.0),
+            ("scale_um_per_m", -10000.0, 10000.0),
             ("free_expansion_um_per_m_k", -30.0, 30.0),
         ],
     ),

@@ -318,6 +318,7 @@ impl Plan {
             taken_out.extend(others().map(|(_, other)| in_runs(stops, &other.one)));
             let d_alone = metric.d(&readings, &taken_out);
             let mut same = self.same_readings(own);
+            same.extend(self.in_course(own.kind, metric, stops, &readings));
             if d_alone < MIN_D_APART {
                 same.extend(others().map(|(_, other)| name(other.kind.id(), axis)));
             }
@@ -359,6 +360,69 @@ impl Plan {
     }
 }
 
+/// Time constants of drifts and of a spindle's growth that a course in time may be, s.
+const RELAXES_S: [f64; 7] = [30.0, 60.0, 240.0, 480.0, 960.0, 2400.0, 6000.0];
+
+impl Plan {
+    /// What reads the same because time and place go together: a drift and an error of the place.
+    fn in_course(
+        &self,
+        kind: Kind,
+        metric: &Metric,
+        stops: &[Stop],
+        readings: &[f64],
+    ) -> Vec<Name> {
+        let axis = self.axis;
+        let is_alike = |mut rivals: Vec<Vec<f64>>| {
+            rivals.push(vec![1.0; stops.len()]);
+            metric.d(readings, &rivals) < MIN_D_APART
+        };
+        let of_stops = |of: &dyn Fn(&Stop) -> f64| -> Vec<f64> {
+            let values: Vec<f64> = stops.iter().map(of).collect();
+            in_runs(stops, &values)
+        };
+        let relaxing = || -> Vec<Vec<f64>> {
+            let relaxed = RELAXES_S.map(|s| of_stops(&|stop| 1.0 - (-stop.time_s / s).exp()));
+            relaxed.to_vec()
+        };
+        let targets = 0..self.targets_mm.len();
+        let is_sorted = matches!(self.layout, Layout::Sorted | Layout::StepCycle);
+        match kind {
+            // A sheet that is sorted by target may be of a step cycle.
+            Kind::Lead | Kind::Scale if is_sorted => vec![name("ambient_drift", axis)],
+            Kind::Lead | Kind::Scale => {
+                let mut courses = relaxing();
+                courses.push(of_stops(&|stop| stop.time_s));
+                courses.push(of_stops(&|stop| stop.time_s.powi(2)));
+                if is_alike(courses) {
+                    vec![name("ambient_drift", axis)]
+                } else {
+                    vec![]
+                }
+            }
+            Kind::Drift => {
+                let at = |target: usize| {
+                    of_stops(&move |stop| f64::from(u8::from(stop.target == target)))
+                };
+                let side = |target: usize| {
+                    of_stops(&move |stop| f64::from(u8::from(stop.target == target && stop.is_up)))
+                };
+                let mut same = vec![];
+                if is_alike(targets.clone().map(at).collect()) {
+                    same.extend([name("pitch_error", axis), name("scale_error", axis)]);
+                } else if is_alike(targets.clone().map(at).chain(targets.map(side)).collect()) {
+                    same.push(name("backlash", axis));
+                }
+                if axis == "Z" && is_alike(relaxing()) {
+                    same.push(name("spindle_growth", ""));
+                }
+                same
+            }
+            Kind::LostMotion | Kind::WornNut | Kind::Cyclic => vec![],
+        }
+    }
+}
+
 /// Values at the stops, ordered by cycle as the metric has them.
 fn in_runs(stops: &[Stop], values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..stops.len()).collect();
@@ -382,6 +446,8 @@ pub fn machine(leads_mm: [f64; 3]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use rand::SeedableRng;
+
     use super::*;
 
     /// By hand, for the chain of `machine`: Z carries the tool on its own line, and where X' stands is no arm of Y'.
@@ -405,5 +471,41 @@ mod tests {
         assert_eq!(turns("Y", [50.0, 80.0]), ["AY"]);
         assert!(turns("Y", [50.0, 0.0]).is_empty());
         assert!(turns("Z", [50.0, 80.0]).is_empty());
+    }
+
+    /// One cycle from one side goes with time as it goes along the axis; five do not, but a sheet of them may be of a step cycle.
+    #[test]
+    fn time_and_place_go_together_in_one_cycle_and_in_a_step_cycle() {
+        let mut random = Pcg64Mcg::seed_from_u64(7);
+        let mut same = |layout, cycles, kind| -> Vec<String> {
+            let plan = Plan {
+                axis: "X",
+                layout,
+                targets_mm: (0..21).map(|k| 20.0 * f64::from(k)).collect(),
+                cycles,
+                dwell_s: 4.0,
+                lead_mm: 10.0,
+                others_mm: [0.0; 2],
+            };
+            let stops = plan.stops(&mut random);
+            let floor = Floor::draw(&mut random, [0.2, 0.2], [0.1, 0.1]);
+            let metric = Metric::of(&floor, &plan.courses(&stops));
+            let slope = |stop: &Stop| 0.05 * stop.place_mm;
+            let risen = |stop: &Stop| 5.0 * (1.0 - (-stop.time_s / 300.0).exp());
+            let readings: Vec<f64> = match kind {
+                Kind::Drift => stops.iter().map(risen).collect(),
+                _ => stops.iter().map(slope).collect(),
+            };
+            let names = plan.in_course(kind, &metric, &stops, &in_runs(&stops, &readings));
+            names.into_iter().map(|(id, _)| id).collect()
+        };
+        let of_place = ["pitch_error", "scale_error"];
+        assert_eq!(same(Layout::OneWay, 1, Kind::Drift), of_place);
+        assert_eq!(same(Layout::OneWay, 1, Kind::Scale), ["ambient_drift"]);
+        assert_eq!(same(Layout::Long, 5, Kind::Drift), [""; 0]);
+        assert_eq!(same(Layout::Long, 5, Kind::Scale), [""; 0]);
+        assert_eq!(same(Layout::StepCycle, 4, Kind::Drift), of_place);
+        assert_eq!(same(Layout::Sorted, 4, Kind::Drift), [""; 0]);
+        assert_eq!(same(Layout::Sorted, 4, Kind::Scale), ["ambient_drift"]);
     }
 }

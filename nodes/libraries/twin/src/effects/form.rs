@@ -66,6 +66,26 @@ pub(super) fn place_splines(heights: &[f64; PLACE_SPLINES], share: f64) -> f64 {
     sum
 }
 
+/// Parts of the travel over which a slope is summed; Simpson's rule.
+const SLOPE_PARTS: usize = 128;
+
+/// Slope of the least-squares line through the splines over the travel, for each unit of the share: 3/2 times the integral of
+/// share times height from -1 to 1.
+pub(super) fn slope_of_splines(heights: &[f64; PLACE_SPLINES]) -> f64 {
+    let step = 2.0 / SLOPE_PARTS as f64;
+    let of = |k: usize| {
+        let share = step * k as f64 - 1.0;
+        let weight = match k {
+            0 | SLOPE_PARTS => 1.0,
+            k if k % 2 == 1 => 4.0,
+            _ => 2.0,
+        };
+        weight * share * place_splines(heights, share)
+    };
+    let sum: f64 = (0..=SLOPE_PARTS).map(of).sum();
+    1.5 * sum * step / 3.0
+}
+
 /// Heights of any curve over the travel beside P2 and P3: P4 and P5, then the splines in the order of [`place_splines`].
 pub(super) const CURVE_UM: &[Parameter] = &[
     Parameter::ordinate("free_p4_um", 500.0, 1.0),

@@ -7,8 +7,10 @@
 //!
 //! ```text
 //!   E = sum_n p_n P_n(x)                                                  (1)
-//!   E += sum_k f_k b_k(x),   splines with knots at the sixteenths        (2)
+//!   E += sum_k f_k (b_k(x) - s_k x),   splines with knots at the sixteenths        (2)
 //! ```
+//!
+//! s_k is the slope of the least-squares line through b_k, so that a slope is `scale_error` alone.
 //!
 //! | symbol | here | unit |
 //! |---|---|---|
@@ -18,7 +20,7 @@
 //!
 //! # Holds when
 //! The error is of the screw, between motor and slide. Not modelled: a period shorter than an eighth of the
-//! travel or part (see `cyclic_error`). Beyond a part its polynomials go on, and its splines end.
+//! travel or part (see `cyclic_error`). Beyond a part its polynomials go on, and its splines stay as at its end.
 //!
 //! # Agreement
 //! `val_a_screw_of_drifting_lead`: of 1.44 µm with a bump 0.1 m long, (1) leaves 0.44, splines at the
@@ -30,7 +32,9 @@
 
 use metrology::Axis;
 
-use super::form::{CURVE_UM, FROM_MM, PLACE_SPLINES, TO_MM, Travel, legendre, place_splines};
+use super::form::{
+    CURVE_UM, FROM_MM, PLACE_SPLINES, TO_MM, Travel, legendre, place_splines, slope_of_splines,
+};
 use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets};
 use crate::Response;
 
@@ -70,15 +74,19 @@ struct PitchError {
     part_mm: [f64; 2],
     polynomial_mm: [f64; 4],
     local_mm: [f64; PLACE_SPLINES],
+    /// Sum of f_k s_k.
+    slope_mm: f64,
 }
 
 impl PitchError {
     fn new(target: &Target, values: &[f64]) -> Self {
+        let local_mm = std::array::from_fn(|k| values[4 + k] * 1e-3);
         Self {
             axis: target.axis(),
             part_mm: [values[FROM], values[FROM + 1]],
             polynomial_mm: std::array::from_fn(|k| values[k] * 1e-3),
-            local_mm: std::array::from_fn(|k| values[4 + k] * 1e-3),
+            local_mm,
+            slope_mm: slope_of_splines(&local_mm),
         }
     }
 }
@@ -92,7 +100,7 @@ impl Effect for PitchError {
             let x = travel.share(*here);
             *sum += legendre(2, &self.polynomial_mm, x); // (1)
             if is_local {
-                *sum += place_splines(&self.local_mm, x); // (2)
+                *sum += place_splines(&self.local_mm, x) - self.slope_mm * x.clamp(-1.0, 1.0); // (2)
             }
         }
     }

@@ -52,7 +52,7 @@ pub static KIND: Kind = Kind {
     title: "reversal spike",
     targets: Targets::LinearAxes,
     parameters: &[
-        Parameter::amplitude("height_um", 30.0, 3.0),
+        Parameter::amplitude("height_um", 100.0, 3.0),
         Parameter::shape(
             "width_ms",
             [0.5, 200.0],

@@ -35,7 +35,7 @@ pub static KIND: Kind = Kind {
     id: "scale_error",
     title: "scale error",
     targets: Targets::LinearAxes,
-    parameters: &[Parameter::amplitude("scale_um_per_m", 200.0, 15.0)],
+    parameters: &[Parameter::amplitude("scale_um_per_m", 10_000.0, 15.0)],
     free: &[Parameter::amplitude("free_expansion_um_per_m_k", 30.0, 5.0)],
     moment: Moment::Mean,
     wanders: 0.0,

@@ -47,3 +47,16 @@ fn eq2_air_that_warms_moves_the_tip_at_once() {
         "{seen:?}"
     );
 }
+
+/// By hand: 1 - exp(-1/4), 1 - exp(-1) and 1 - exp(-4) of 10 µm.
+#[test]
+fn eq2_a_set_up_that_settles_in_four_minutes_by_hand() {
+    let machine = bench();
+    let mut run = stands(&[60.0, 240.0, 960.0], |_| [0.0; 3]);
+    read(&mut run, &Channel::Length(Axis::Y));
+    let given = [("rate_um_per_h", 0.0), ("free_in_4_min_um", 10.0)];
+    let seen = predict(&machine, &History::default(), &run, ID, &given);
+    for (mm, right_um) in seen.iter().zip([2.212, 6.321, 9.817]) {
+        assert!((1e3 * mm - right_um).abs() < 0.001, "{seen:?}");
+    }
+}

@@ -453,3 +453,23 @@ fn prop_a_run_that_recorded_less_is_no_reason_to_panic() {
         }
     }
 }
+
+/// The page on machine files has a row for each effect, with every parameter and its range.
+#[test]
+fn the_reference_has_the_ranges_of_the_catalogue() {
+    let page = include_str!("../../../../../../docs/reference/machine-file.md");
+    for kind in twin::effects::CATALOGUE {
+        let begin = format!("| `{}` |", kind.id);
+        let row = page.lines().find(|line| line.starts_with(&begin));
+        let row = row.unwrap_or_else(|| panic!("no row of {}", kind.id));
+        for parameter in kind.parameters {
+            let range = if parameter.low < 0.0 && parameter.low + parameter.high == 0.0 {
+                format!("±{}", parameter.high)
+            } else {
+                format!("{} to {}", parameter.low, parameter.high)
+            };
+            let words = format!("`{}` ({range})", parameter.name);
+            assert!(row.contains(&words), "{words} is not in: {row}");
+        }
+    }
+}

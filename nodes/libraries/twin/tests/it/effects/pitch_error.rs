@@ -99,3 +99,31 @@ fn eq1_eq2_a_curve_over_a_part_of_the_travel_is_that_of_a_travel_as_long() {
         }
     }
 }
+
+/// The slope of a position error is the scale's: no part of the curve has any over the travel.
+#[test]
+fn eq2_no_part_of_a_curve_has_a_slope() {
+    let machine = three_axes("[w X' Y' b Z t]");
+    let ticks = 6401_usize;
+    let run = run(ticks, AxisSet::XYZ, |t| {
+        [-320.0 + 100.0 * t, 0.0, 0.0, 0.0, 0.0, 0.0]
+    });
+    let wide = (1..8).map(|k| format!("free_{k}_of_8_um"));
+    let narrow = (1..16).step_by(2).map(|k| format!("free_{k}_of_16_um"));
+    let others = ["p3_um", "free_p5_um"].map(str::to_owned);
+    for name in wide.chain(narrow).chain(others) {
+        let mut given = vec![("p2_um", 0.0), ("p3_um", 0.0)];
+        given.retain(|(other, _)| *other != name);
+        given.push((&name, 1.0));
+        let response = response_of(&machine, &run, "pitch_error", "X", &given);
+        let at_mm = &run.motion.position[Axis::X];
+        let n = at_mm.len() as f64;
+        let middle_mm = at_mm.iter().sum::<f64>() / n;
+        let along = at_mm.iter().zip(&response.drive[Axis::X]);
+        let along: f64 = along.map(|(x, mm)| (x - middle_mm) * 1e3 * mm).sum();
+        let square: f64 = at_mm.iter().map(|x| (x - middle_mm).powi(2)).sum();
+        // 1 µm over half of the travel, 320 mm, would be 3.1e-3.
+        let um_per_mm = along / square;
+        assert!(um_per_mm.abs() < 2e-5, "{name}: {um_per_mm}");
+    }
+}
