@@ -262,7 +262,31 @@ fn check_sizes(signatures: &Library, members: &mut [Member]) {
         if let [span] = spans[..] {
             let check = Check::new(CheckId::Determined, span < WHOLE_RANGE);
             member.put(check.with(span, WHOLE_RANGE));
+            check_sign(kind, member);
         }
+    }
+}
+
+/// Names no size whose interval, with what it owes to its form, does not even determine its sign.
+fn check_sign(kind: &'static Kind, member: &mut Member) {
+    let estimate = &member.estimate;
+    let all: Vec<&Parameter> = kind.parameters.iter().chain(kind.free).collect();
+    let sizes = estimate.active.iter().copied();
+    let sizes: Vec<usize> = sizes
+        .filter(|place| all[*place].role == Role::Amplitude)
+        .collect();
+    // Of several sizes one may be open where their sum is not.
+    let [place] = sizes[..] else {
+        return;
+    };
+    if all[place].low >= 0.0 {
+        return;
+    }
+    let [value, low, high] =
+        [&estimate.values, &estimate.low, &estimate.high].map(|own| own[place]);
+    if low < 0.0 && high > 0.0 {
+        let sigmas = refit::COVERAGE * value.abs() / (0.5 * (high - low)).max(f64::MIN_POSITIVE);
+        member.put(Check::new(CheckId::Sure, false).with(sigmas, veto::MIN_SIZE_DEVIATIONS));
     }
 }
 

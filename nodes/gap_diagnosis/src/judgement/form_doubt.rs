@@ -29,13 +29,11 @@ use twin::effects::{Parameter, Role};
 
 use crate::noise::form_error;
 use crate::noise::stack::Stack;
-use crate::search::refit::{self, Estimate};
+use crate::search::refit::{self, COVERAGE, Estimate};
 use crate::search::rows::count;
 use crate::search::signature::{Form, Library};
 use crate::search::widening;
 
-/// Coverage factor of the intervals.
-const COVERAGE: f64 = 1.96;
 /// Squared cosine from which a free amplitude is the form over again.
 const MAX_SQUARED_COSINE: f64 = 0.98;
 

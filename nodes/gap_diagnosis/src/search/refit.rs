@@ -332,7 +332,7 @@ fn moved<'f>(members: &[Member<'f>], by: &[f64], share: f64) -> Vec<Member<'f>> 
 }
 
 /// Coverage factor of the intervals.
-const COVERAGE: f64 = 1.96;
+pub const COVERAGE: f64 = 1.96;
 
 /// Standard uncertainty of each member's first value with its shares: that of the sum, where it takes the first value's
 /// place among what is estimated.
