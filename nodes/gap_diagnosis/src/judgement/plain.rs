@@ -47,7 +47,7 @@ pub fn plainest(signatures: &Library, visited: &BTreeMap<Set, f64>, best: Set) -
 }
 
 /// Curves, and the lines that each may be taken for where only a part of a travel was read.
-const CURVES: [(&str, &[&str]); 2] = [
+const LINES_OF_CURVES: [(&str, &[&str]); 2] = [
     ("pitch_error", &["scale_error"]),
     ("straightness", &["squareness"]),
 ];
@@ -62,7 +62,10 @@ pub fn straightened(signatures: &Library, best: Set, mut score: impl FnMut(&Set)
     };
     let mut now = best;
     for member in now.clone() {
-        let Some((_, lines)) = CURVES.iter().find(|(curve, _)| *curve == id(member)) else {
+        let Some((_, lines)) = LINES_OF_CURVES
+            .iter()
+            .find(|(curve, _)| *curve == id(member))
+        else {
             continue;
         };
         let others: Vec<usize> = now.iter().copied().filter(|form| *form != member).collect();

@@ -13,7 +13,7 @@
 //! The mean of all runs takes the mean drift of a run with it, the same of every j; beside their mean the j have what runs differ by
 //! with no course in time. s is taken for the standard deviation of offset and drift; v is the variance of a row, N their number.
 //! One or two joins hardly determine s: [`PRIOR_JOINS`] of the size that the deviation over place has are counted with them, and of what is
-//! likely the quantile [`CAUTION_OF_FEW`] is used.
+//! likely the quantile `CAUTION` is used, of three runs [`CAUTION_OF_FEW`].
 //!
 //! # Holds when
 //! No pause between two runs is longer than a run; joins across a change (`changes`) are left out.
@@ -22,6 +22,7 @@ use metrology::sample::TestKind;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use twin::{Channel, Session};
 
+use super::CAUTION;
 use crate::search::rows::{Block, count, time_s};
 
 /// Joins of the usual size that are counted with those that were seen.
@@ -30,10 +31,12 @@ const PRIOR_JOINS: f64 = 2.0;
 const MIN_RUNS: usize = 3;
 /// Fewest rows of a line.
 const MIN_ROWS: usize = 3;
-/// Share of the posterior of s below what is used: three runs go one way by chance now and then.
+/// Share of the posterior of s below what is used with one join beside the mean: three runs go one way by chance now and then.
 const CAUTION_OF_FEW: f64 = 0.95;
+/// Joins beside the mean from which `CAUTION` is enough.
+const MANY: f64 = 1.5;
 /// Least part of the standard deviation of a row that s is taken for.
-const LEAST_SHARE: f64 = 0.03;
+const LEAST_APART_SHARE: f64 = 0.03;
 
 /// What runs show at their joins.
 #[derive(Clone, Debug, PartialEq)]
@@ -143,11 +146,17 @@ pub fn apart_mm(all: &[&Joins], row_sigma_mm: f64, usual_mm: f64) -> f64 {
     let of_mean_mm = 2.0 * row_sigma_mm / rows.sqrt();
     let prior = PRIOR_JOINS * 4.0 * usual_mm.max(of_mean_mm).powi(2);
     let counted = freedom + PRIOR_JOINS;
-    let least =
-        ChiSquared::new(counted).map_or(counted, |law| law.inverse_cdf(1.0 - CAUTION_OF_FEW));
+    let caution = if freedom > MANY {
+        CAUTION
+    } else {
+        CAUTION_OF_FEW
+    };
+    let least = ChiSquared::new(counted).map_or(counted, |law| law.inverse_cdf(1.0 - caution));
     let of_noise = 8.0 * row_sigma_mm.powi(2) / rows;
     let variance = ((square + prior) / least - of_noise) / 4.0;
-    variance.max((LEAST_SHARE * row_sigma_mm).powi(2)).sqrt()
+    variance
+        .max((LEAST_APART_SHARE * row_sigma_mm).powi(2))
+        .sqrt()
 }
 
 #[cfg(test)]
@@ -162,11 +171,11 @@ mod tests {
         }
     }
 
-    /// By hand: 40 joins of 4 s^2 = 4 µm^2 each; the chi-square of 42 exceeds 28.1 in nineteen of twenty, and noise is 8/30 of 0.01.
+    /// By hand: 40 joins of 4 s^2 = 4 µm^2 each; the chi-square of 42 exceeds 36.9 in seven of ten, and noise is 8/30 of 0.01.
     #[test]
     fn eq2_many_joins_determine_how_far_runs_are_apart() {
         let found_um = 1e3 * apart_mm(&[&joins(160e-6, 40.0)], 0.1e-3, 0.0);
-        let right_um = ((160.0 / 28.1 - 8.0 / 30.0 * 0.01) / 4.0_f64).sqrt();
+        let right_um = ((160.0 / 36.9 - 8.0 / 30.0 * 0.01) / 4.0_f64).sqrt();
         assert!((found_um - right_um).abs() < 0.01, "{found_um} {right_um}");
     }
 }
