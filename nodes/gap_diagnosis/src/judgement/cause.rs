@@ -267,7 +267,10 @@ fn check_sizes(signatures: &Library, members: &mut [Member]) {
     }
 }
 
-/// Names no size whose interval, with what it owes to its form, does not even determine its sign.
+/// D from which a size is seen whatever its form is.
+const FAR_ABOVE_NOISE: f64 = 10.0;
+
+/// Names no size near noise whose interval, with what it owes to its form, does not even determine its sign.
 fn check_sign(kind: &'static Kind, member: &mut Member) {
     let estimate = &member.estimate;
     let all: Vec<&Parameter> = kind.parameters.iter().chain(kind.free).collect();
@@ -279,7 +282,7 @@ fn check_sign(kind: &'static Kind, member: &mut Member) {
     let [place] = sizes[..] else {
         return;
     };
-    if all[place].low >= 0.0 {
+    if all[place].low >= 0.0 || estimate.d >= FAR_ABOVE_NOISE {
         return;
     }
     let [value, low, high] =
