@@ -1,4 +1,4 @@
-//! What a ballbar in one plane cannot tell of its two axes.
+//! Effects of the two axes of a plane that a ballbar in this plane alone cannot separate.
 //!
 //! # Model
 //!
