@@ -85,16 +85,17 @@ class Desk:
         self.domain = domain
         self.types = types()
 
-    def tokens(self, wanted: str) -> list[str]:
-        """All tokens of the domain, once one of them has `wanted` in it."""
+    def tokens(self, wanted: list[tuple[str, str]]) -> list[str]:
+        """All tokens of the domain, once each kind and name of `wanted` is there: a node declares them one by one."""
         deadline = time.monotonic() + 15
         while time.monotonic() < deadline:
             replies = self.session.liveliness().get(f"@ros2_lv/{self.domain}/**", timeout=2.0)
             found = [str(reply.ok.key_expr) for reply in replies if reply.ok]
-            if any(wanted in token for token in found):
+            absent = [end for end in wanted if not named(found, *end)]
+            if not absent:
                 return sorted(found)
             time.sleep(0.1)
-        raise SystemExit(f"no token with {wanted}")
+        raise SystemExit(f"no token of {absent} in 15 s")
 
     def key(self, topic: str, ros_type: str) -> str:
         digest = self.types.hash_rihs01(ros_type)
@@ -187,9 +188,29 @@ class Desk:
         time.sleep(0.5)
 
 
-def one(tokens: list[str], kind: str, name: str) -> str:
+# The publishers and services of the node that this peer meets.
+ENDS = [
+    ("MP", "/axes/state"),
+    ("MP", "/cnc/run_program/_action/feedback"),
+    ("MP", "/cnc/run_program/_action/status"),
+    ("SS", "/cnc/run_program/_action/cancel_goal"),
+    ("SS", "/cnc/run_program/_action/get_result"),
+    ("SS", "/cnc/run_program/_action/send_goal"),
+    ("SS", "/fake_cnc/change_state"),
+    ("SS", "/fake_cnc/get_parameters"),
+    ("SS", "/fake_cnc/get_state"),
+    ("SS", "/fake_cnc/list_parameters"),
+    ("SS", "/fake_cnc/set_parameters"),
+]
+
+
+def named(tokens: list[str], kind: str, name: str) -> list[str]:
     mangled = name.replace("/", "%")
-    found = [t for t in tokens if t.split("/")[5] == kind and t.split("/")[9:10] == [mangled]]
+    return [t for t in tokens if t.split("/")[5] == kind and t.split("/")[9:10] == [mangled]]
+
+
+def one(tokens: list[str], kind: str, name: str) -> str:
+    found = named(tokens, kind, name)
     assert len(found) == 1, f"{kind} {name}: {found}"
     return found[0]
 
@@ -242,7 +263,7 @@ def managed(desk: Desk, tokens: list[str]) -> list:
 
 def meet(endpoint: str, domain: int) -> None:
     desk = Desk(endpoint, domain)
-    tokens = desk.tokens("%run_program%_action%status")
+    tokens = desk.tokens(ENDS)
     seen = {"tokens": tokens}
     state = "abbe_msgs/msg/AxisState"
     seen["hash"] = desk.types.hash_rihs01(state)
