@@ -14,7 +14,10 @@
 //! standard names. (3) is derived, not of the standard: it keeps what the diagonals differ by, and
 //! needs deviations that are zero at the same corner's end of each.
 //!
-//! E_d and B_d have the uncertainty of the diagonal that has them. Of two means on different diagonals, l₁ and l₂ from
+//! E_d and B_d have the standard uncertainty of the diagonal that has them, equations (2) and (6) of
+//! [`positioning::budget`](super::positioning::budget). Over a diagonal most of it is limits, of temperatures and
+//! coefficients for E_d, of slow drift for B_d, and 2 u of limits holds more than 2 u of a normal distribution. Their U
+//! is therefore k u, with k of their sum, (7) of [`budget`](super::budget), 1.65 to 2. Of two means on different diagonals, l₁ and l₂ from
 //! their zeros, one device and one machine have read both. The certificate states (U₀ + U₁ l)² = U₀² + 2 U₀ U₁ l + (U₁ l)² of
 //! each length. The last is the error that grows as the length, the scale's: common to both, it counts for l₁ − l₂. The two
 //! others and the alignment are new on each diagonal:
@@ -50,7 +53,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::budget::combined;
+use super::budget::{combined, coverage_factor};
+use super::expanded::COVERAGE_FACTOR;
 use super::positioning::budget::PositioningBudget;
 use super::positioning::{self, PointResult, PositioningResult, PositioningRuns};
 use super::{ExpandedLength, Iso230Error};
@@ -111,8 +115,12 @@ pub struct DiagonalsResult {
     pub diagonals: Vec<DiagonalResult>,
     /// E_d, (2).
     pub systematic_error: ExpandedLength,
+    /// k of U of E_d.
+    pub systematic_error_coverage_factor: f64,
     /// B_d, (2).
     pub reversal: ExpandedLength,
+    /// k of U of B_d.
+    pub reversal_coverage_factor: f64,
     /// (3); not a figure of the standard.
     pub spread: ExpandedLength,
     /// (5); not a figure of the standard.
@@ -165,13 +173,27 @@ pub fn evaluate(
         .map(one)
         .collect::<Result<_, Iso230Error>>()?;
     let (means, diagonals): (Vec<_>, Vec<_>) = found.into_iter().unzip();
-    // The diagonal that has the greatest has its uncertainty too.
-    let of = |figure: fn(&PositioningResult) -> ExpandedLength| {
-        let figures = diagonals.iter().map(|d| figure(&d.positioning));
-        let most = figures.max_by(|a, b| a.value_mm.total_cmp(&b.value_mm));
-        most.unwrap_or(ExpandedLength::new(0.0, 0.0))
+    let of = |figure: fn(&PositioningResult) -> ExpandedLength,
+              factor: fn(&PositioningResult, &PositioningBudget) -> f64| {
+        let by_value = |a: &&DiagonalResult, b: &&DiagonalResult| {
+            let [a, b] = [a, b].map(|one| figure(&one.positioning).value_mm);
+            a.total_cmp(&b)
+        };
+        // The diagonal that has the greatest has its uncertainty too.
+        let most = diagonals.iter().max_by(by_value);
+        most.map_or((ExpandedLength::new(0.0, 0.0), COVERAGE_FACTOR), |one| {
+            let (found, k) = (figure(&one.positioning), factor(&one.positioning, budget));
+            let expanded_uncertainty_mm = k * found.standard_uncertainty_mm();
+            let figure = ExpandedLength {
+                expanded_uncertainty_mm,
+                ..found
+            };
+            (figure, k)
+        })
     };
-    let (systematic_error, reversal) = (of(|p| p.systematic_error), of(|p| p.reversal));
+    let (systematic_error, systematic_error_coverage_factor) =
+        of(|p| p.systematic_error, factor_of_systematic);
+    let (reversal, reversal_coverage_factor) = of(|p| p.reversal, factor_of_reversal);
     let (ends, means) = (means.iter().filter_map(|of| of.last()), means.concat());
     let lengths: Vec<Mean> = { ends.zip(&diagonals) }
         .map(|(end, of)| Mean {
@@ -181,11 +203,41 @@ pub fn evaluate(
         .collect();
     Ok(DiagonalsResult {
         systematic_error,
+        systematic_error_coverage_factor,
         reversal,
+        reversal_coverage_factor,
         spread: range(&means, budget, 2.0),
         lengths: range(&lengths, budget, 1.0),
         diagonals,
     })
+}
+
+/// k of E of one diagonal, of the parts over the distance of its extremes.
+fn factor_of_systematic(found: &PositioningResult, budget: &PositioningBudget) -> f64 {
+    let parts = budget.over(found.extremes_apart_mm(), found.contributions.length_mm);
+    let drift_mm = (2.0 / found.n_runs as f64).sqrt() * parts.drift_mm;
+    coverage_factor(
+        parts.device_mm.hypot(drift_mm),
+        &[
+            parts.alignment_mm,
+            parts.machine_temperature_mm,
+            parts.machine_expansion_mm,
+            parts.device_temperature_mm,
+            parts.device_expansion_mm,
+        ],
+    )
+}
+
+/// k of B of one diagonal: slow drift is a limit, unrest is normal; 2 where all drift counts as new at every reading.
+fn factor_of_reversal(found: &PositioningResult, budget: &PositioningBudget) -> f64 {
+    let (n, drift_mm) = (found.n_runs as f64, found.contributions.drift_mm);
+    let (slow_mm, new_mm) = (2.0 * drift_mm / n, (2.0 / n).sqrt());
+    match budget.environmental_unrest_mm.map(|w| new_mm * w) {
+        Some(unrest_mm) if slow_mm.hypot(unrest_mm) < new_mm * drift_mm => {
+            coverage_factor(unrest_mm, &[slow_mm])
+        }
+        _ => COVERAGE_FACTOR,
+    }
 }
 
 /// A mean deviation, or the length, of a diagonal.

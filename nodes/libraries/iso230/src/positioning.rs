@@ -244,6 +244,16 @@ pub struct PositioningResult {
     pub remarks: Vec<PositioningRemark>,
 }
 
+impl PositioningResult {
+    /// Distance between the places of the greatest and the least mean deviation, mm.
+    pub(super) fn extremes_apart_mm(&self) -> f64 {
+        let sides = |p: &PointResult| {
+            [p.up, p.down].map(|side| [p.target_mm, side.mean_mm, side.mean_mm, 0.0])
+        };
+        between(self.points.iter().flat_map(sides)).apart_mm
+    }
+}
+
 /// Evaluates one axis.
 ///
 /// # Errors

@@ -175,7 +175,7 @@ fn diagonals_section(
                 figure(&result.reversal, measured.is_stated),
                 figure(&result.lengths, lengths_stated),
                 figure(&result.spread, lengths_stated),
-                measured.coverage()
+                coverage(&result, &measured)
             )));
             measured.state_correction(&mut section, span_mm);
             section.tables.push(of_diagonals(&result, &measured));
@@ -197,6 +197,23 @@ fn diagonals_section(
         Err(error) => section.not_evaluated(error),
     }
     section
+}
+
+/// The coverage factors of a sentence; empty where no uncertainty is stated.
+fn coverage(result: &DiagonalsResult, measured: &Measured) -> String {
+    if !measured.is_stated {
+        return String::new();
+    }
+    let [of_error, of_reversal] = [
+        result.systematic_error_coverage_factor,
+        result.reversal_coverage_factor,
+    ];
+    let of_error = if measured.are_lengths_stated {
+        format!("of E_d {of_error:.2}, ")
+    } else {
+        String::new()
+    };
+    format!(" (± U, k = 2, {of_error}of B_d {of_reversal:.2}, where limits are most of U)")
 }
 
 /// Mean deviation of both directions over the distance along each diagonal.
