@@ -29,12 +29,14 @@ use crate::SOFTWARE;
 use crate::history::alarms::{self, Alarms, LimitsOption};
 use crate::history::keep::Keep;
 use crate::history::origin::Origin;
+use crate::import::Named;
 use crate::pdf;
 use crate::report_bag::from_table;
 use crate::tell::tell;
 
 pub mod bags;
 mod machine_text;
+mod no_machine;
 mod opened;
 mod second_round;
 pub mod simulated;
@@ -47,13 +49,13 @@ use simulated::Beside;
 /// Arguments of `abbe diagnose`.
 #[derive(Args)]
 pub struct Diagnose {
-    /// Folders of the bags, in the order of their recording; tables too, with --machine.
+    /// Folders of the bags, in the order of their recording; tables too.
     #[arg(required = true)]
     bags: Vec<PathBuf>,
     /// Map of the tables among them; without it their columns are recognised.
     #[arg(long)]
     map: Option<PathBuf>,
-    /// Machine file that the simulator runs on; without it the one in the first bag.
+    /// Machine file that the simulator runs on; without it the one in the first bag, or of tables a plain machine.
     #[arg(long)]
     machine: Option<PathBuf>,
     /// Bag or table that your own simulator made of the same tests, in the place of the twin's prediction; may be given several times.
@@ -118,8 +120,9 @@ impl Diagnose {
     /// When a bag or the machine file cannot be read, nothing was repeated, or the bag is another machine's.
     pub fn execute(self) -> Result<ExitCode> {
         self.refuse_outputs()?;
-        let (opened, (name, text)) = self.opened()?;
-        let round = self.round(&name, &text)?;
+        let (opened, machine_file) = self.opened()?;
+        let (name, text) = (&machine_file.place, &machine_file.text);
+        let round = self.round(name, text)?;
         let config = GapConfig {
             left_out: self.without.clone(),
             ablated: self.ablate.iter().copied().collect(),
@@ -127,11 +130,11 @@ impl Diagnose {
         };
         let budget = self.budget.as_deref().map(Budget::open).transpose()?;
         let limits = self.limits.open()?;
-        let simulated = self.opened_simulated((&name, &text))?;
-        let mut diagnosed = beside(&opened.bags, &simulated.bags, &name, &text, &config)?;
+        let simulated = self.opened_simulated(&machine_file)?;
+        let mut diagnosed = beside(&opened.bags, &simulated.bags, name, text, &config)?;
         opened.name_as_given(&mut diagnosed, &self.bags);
         simulated.name_simulated(&mut diagnosed, &self.simulated);
-        let machine = MachineFile::parse(&text, &name)?.name;
+        let machine = MachineFile::parse(text, name)?.name;
         let title = format!("Simulator against machine: {machine}");
         let mut page = gap::page(&title, &diagnosed, self.explain)?;
         let mut between = None;
@@ -162,7 +165,7 @@ impl Diagnose {
             tell!("{}", page.short(&Room::with_page(self.html.as_deref())));
         }
         self.write(&page, &json, on_terminal)?;
-        self.write_machine(&diagnosed, &name, &text)?;
+        self.write_machine(&diagnosed, name, text)?;
         if let Some(round) = &round {
             for line in round.write(&diagnosed.diagnosis.report)? {
                 complain!("abbe: {line}");
@@ -177,30 +180,28 @@ impl Diagnose {
         alarms::ended(alarms.as_ref(), kept, code)
     }
 
-    /// The bags to read, and name and text of the machine file.
-    fn opened(&self) -> Result<(Opened, (String, String))> {
-        let stated = match &self.machine {
+    /// The bags to read, and the machine file.
+    fn opened(&self) -> Result<(Opened, Named)> {
+        let map = self.map.as_deref();
+        let (opened, machine) = match &self.machine {
+            None => Opened::without_machine(&self.bags, map)?,
             Some(path) => {
                 let file = text_file::yaml_file(path).context("machine file")?;
-                Some((file.path.display().to_string(), file.text))
+                let machine = Named {
+                    place: file.path.display().to_string(),
+                    text: file.text,
+                };
+                (Opened::of(&self.bags, map, &machine)?, machine)
             }
-            None => None,
-        };
-        let named = stated.as_ref();
-        let machine = named.map(|(name, text)| (name.as_str(), text.as_str()));
-        let opened = Opened::of(&self.bags, self.map.as_deref(), machine)?;
-        let machine = match stated {
-            Some(machine) => machine,
-            None => bags::machine_text(&opened.bags[0])?,
         };
         Ok((opened, machine))
     }
 
     /// The bags and tables of another simulator, for the same machine file.
-    fn opened_simulated(&self, machine: (&str, &str)) -> Result<Opened> {
+    fn opened_simulated(&self, machine: &Named) -> Result<Opened> {
         let has_tables = self.simulated.iter().any(|path| from_table::is_table(path));
         let map = self.map.as_deref().filter(|_| has_tables);
-        Opened::of(&self.simulated, map, Some(machine)).context("--simulated")
+        Opened::of(&self.simulated, map, machine).context("--simulated")
     }
 
     /// The JSON, and the figures that are kept beside their limits, which are behind page and JSON.

@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use reports::gap::diagnosed::Diagnosed;
 
+use super::bags;
+use super::no_machine::{Assumed, Shown};
 use crate::import::Named;
-use crate::report_bag::foreign_log;
+use crate::report_bag::foreign_log::{self, Log};
 use crate::report_bag::from_table::{self, FromTable};
 
 /// Bags as they are read, and the tables that some were made of.
@@ -14,42 +16,29 @@ pub struct Opened {
     /// Each bag, in the order of the arguments.
     pub bags: Vec<PathBuf>,
     tables: Vec<FromTable>,
+    /// What was assumed of a machine that nobody stated.
+    assumed: Vec<String>,
 }
 
 impl Opened {
-    /// Takes bags as they are, and imports tables for a machine file (its name and its text) by a map, or by what is
-    /// recognised in them.
+    /// Takes bags as they are, and imports tables for a machine file by a map, or by what is recognised in them.
     ///
     /// # Errors
-    /// When a map is named without a table, a table without a machine file, or a table cannot be imported.
-    pub fn of(
-        paths: &[PathBuf],
-        map: Option<&Path>,
-        machine: Option<(&str, &str)>,
-    ) -> Result<Self> {
+    /// When a map is named without a table, or a table cannot be imported.
+    pub fn of(paths: &[PathBuf], map: Option<&Path>, machine: &Named) -> Result<Self> {
         let (mut bags, mut tables) = (vec![], vec![]);
         for path in paths {
-            let log = match from_table::is_table(path) {
-                true => None,
-                false => foreign_log::of(path)?,
-            };
-            if !from_table::is_table(path) && log.is_none() {
+            let Some(source) = Source::of(path)? else {
                 bags.push(path.clone());
                 continue;
-            }
-            let Some((name, text)) = machine else {
-                bail!(
-                    "{}: a table has no machine file: write one (abbe new-machine FILE) and name it with --machine",
-                    path.display()
-                );
             };
             let machine = Named {
-                place: name.to_owned(),
-                text: text.to_owned(),
+                place: machine.place.clone(),
+                text: machine.text.clone(),
             };
-            let table = match log {
-                Some(log) => from_table::of_log(path, &log, map, Some(machine))?,
-                None => from_table::of_machine(path, map, machine)?,
+            let table = match source {
+                Source::Log(log) => from_table::of_log(path, &log, map, Some(machine))?,
+                Source::Table => from_table::of_machine(path, map, machine)?,
             };
             bags.push(table.bag.clone());
             tables.push(table);
@@ -57,20 +46,49 @@ impl Opened {
         if tables.is_empty() && map.is_some() {
             bail!("--map does nothing: none of the bags is a table: remove it");
         }
-        Ok(Self { bags, tables })
+        Ok(Self {
+            bags,
+            tables,
+            assumed: vec![],
+        })
+    }
+
+    /// The same where no machine file is named: that of the first bag, and of tables alone the plain machine that they show.
+    ///
+    /// # Errors
+    /// As [`Self::of`], and when the first bag has no machine file.
+    pub fn without_machine(paths: &[PathBuf], map: Option<&Path>) -> Result<(Self, Named)> {
+        let mut shown = Shown::default();
+        for path in paths {
+            let table = match Source::of(path)? {
+                None => {
+                    let (place, text) = bags::machine_text(path)?;
+                    let machine = Named { place, text };
+                    return Ok((Self::of(paths, map, &machine)?, machine));
+                }
+                Some(Source::Log(log)) => from_table::of_log(path, &log, map, None)?,
+                Some(Source::Table) => from_table::of_any(path, map)?,
+            };
+            shown.add(&table.bag)?;
+        }
+        let Assumed { machine, lines } = shown.machine();
+        let opened = Self {
+            assumed: lines,
+            ..Self::of(paths, map, &machine)?
+        };
+        Ok((opened, machine))
     }
 
     /// What was recognised in the tables and what they lack, a line each.
     pub fn lines(&self) -> Vec<String> {
-        let tables = self.tables.iter();
-        tables
-            .flat_map(|table| table.lines.iter().cloned())
-            .collect()
+        let lines = self.tables.iter().flat_map(|table| &table.lines);
+        self.assumed.iter().chain(lines).cloned().collect()
     }
 
     /// What was assumed of columns, and readings that no machine has.
     pub fn warnings(&self) -> Vec<String> {
-        self.tables.iter().flat_map(FromTable::warnings).collect()
+        let of_tables = self.tables.iter().flat_map(FromTable::warnings);
+        self.assumed.iter().cloned().chain(of_tables).collect()
     }
 
     /// Whether any of them is a table.
@@ -111,19 +129,36 @@ impl Opened {
     }
 }
 
+/// What a table is made of.
+enum Source {
+    Table,
+    /// A bag of another program that holds a log.
+    Log(Log),
+}
+
+impl Source {
+    /// `None`: a bag.
+    fn of(path: &Path) -> Result<Option<Self>> {
+        if from_table::is_table(path) {
+            return Ok(Some(Self::Table));
+        }
+        Ok(foreign_log::of(path)?.map(Self::Log))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_table_needs_a_machine_file_and_a_map_needs_a_table() {
-        let said = |paths: &[&str], map: Option<&str>| {
-            let paths: Vec<PathBuf> = paths.iter().map(PathBuf::from).collect();
-            let refused = Opened::of(&paths, map.map(Path::new), None).err();
-            refused.map(|error| error.to_string()).unwrap_or_default()
+    fn a_map_needs_a_table() {
+        let machine = Named {
+            place: "machine.yaml".to_owned(),
+            text: String::new(),
         };
-        assert!(said(&["laser.csv"], None).contains("name it with --machine"));
-        assert!(said(&["bag"], Some("map.yaml")).contains("none of the bags is a table"));
-        assert_eq!(said(&["bag"], None), "");
+        let refused = |map: Option<&Path>| Opened::of(&["bag".into()], map, &machine).err();
+        let why = refused(Some(Path::new("map.yaml"))).unwrap().to_string();
+        assert!(why.contains("none of the bags is a table"), "{why}");
+        assert!(refused(None).is_none());
     }
 }

@@ -5,6 +5,7 @@
 
 use anyhow::{Context, Result, bail};
 
+use super::bare_touches;
 use super::probe_log;
 use super::renishaw_laser;
 use super::sheet::Cells;
@@ -34,7 +35,7 @@ enum Content {
 }
 
 /// The forms that are known, one a line.
-static INSTRUMENTS: [Instrument; 6] = [
+static INSTRUMENTS: [Instrument; 7] = [
     Instrument {
         name: LINUXCNC_LIST,
         is_one: probe_log::is_linuxcnc,
@@ -44,6 +45,11 @@ static INSTRUMENTS: [Instrument; 6] = [
         name: LETTERED_LIST,
         is_one: probe_log::is_lettered,
         content: Content::Table(probe_log::lettered),
+    },
+    Instrument {
+        name: "list of touches without names",
+        is_one: bare_touches::is_one,
+        content: Content::Table(bare_touches::cells),
     },
     Instrument {
         name: "Renishaw laser file (rtl, rta)",

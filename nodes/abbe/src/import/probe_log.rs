@@ -29,7 +29,7 @@ fn lines(text: &str) -> impl Iterator<Item = (u64, &str)> {
     (1..).zip(text.lines()).map(|(n, line)| (n, line.trim()))
 }
 
-fn filled(text: &str) -> Vec<&str> {
+pub(super) fn filled(text: &str) -> Vec<&str> {
     let whole = match text.rfind('\n') {
         Some(end) if end > 0 => &text[..end],
         _ => text,
@@ -160,7 +160,7 @@ pub fn lettered(text: &str) -> Result<Cells> {
     table(text, &place, vec![])
 }
 
-fn table(
+pub(super) fn table(
     text: &str,
     read: &dyn Fn(&str) -> Option<Vec<Word>>,
     mut remarks: Vec<String>,

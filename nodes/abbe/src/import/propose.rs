@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use metrology::Axis;
 
-use super::map::{Direction, Map, Test, units};
+use super::map::{Direction, units};
 use super::pass_names;
 use super::recognise::{Known, Recognised, Role};
 use super::separators;
@@ -498,44 +498,6 @@ fn sensor_id(name: &str, n: usize) -> String {
     } else {
         format!("sensor_{}", n + 1)
     }
-}
-
-/// Name of the machine of a table that states none.
-pub const NO_MACHINE: &str = "not_stated";
-
-/// A machine of which nothing is stated but what a map names, wide enough for any table.
-pub fn machine_for(map: &Map) -> String {
-    let (axis, sensors) = match &map.test {
-        Test::Positioning { axis, .. } => (*axis, vec![]),
-        Test::Circle { .. } | Test::Touches { .. } => (Axis::X, vec![]),
-        Test::Log {
-            axis,
-            temperature_degc,
-            ..
-        } => (*axis, temperature_degc.keys().collect()),
-    };
-    let linear = "{travel_mm: [-100000.0, 100000.0], feed_limit_mm_min: 1000000.0}";
-    let rotary = "{travel_deg: [-3600.0, 3600.0], feed_limit_deg_min: 1000000.0, acceleration_limit_deg_s2: 1000.0, position_gain_per_s: 40.0, velocity_feedforward: 0.98, encoder_resolution_arcsec: 0.1}";
-    let mut text = format!("name: {NO_MACHINE}\n");
-    if axis.is_linear() {
-        text.push_str("chain: \"[w X' Y' b Z t]\"\n");
-    } else {
-        let _ = writeln!(text, "chain: \"[w {axis}' X' Y' b Z t]\"");
-    }
-    let _ = writeln!(text, "axes:\n  X: {linear}\n  Y: {linear}\n  Z: {linear}");
-    if !axis.is_linear() {
-        let _ = writeln!(
-            text,
-            "  {axis}: {rotary}\nrotary:\n  origin_mm: {{{axis}: [0.0, 0.0, 0.0]}}"
-        );
-    }
-    if !sensors.is_empty() {
-        text.push_str("temperature_sensors:\n");
-    }
-    for id in sensors {
-        let _ = writeln!(text, "  - {{id: {id}, place: ambient, period_s: 10.0}}");
-    }
-    text
 }
 
 mod across;

@@ -5,7 +5,7 @@ use metrology::Axis;
 use metrology::number::number;
 
 use super::map::{Map, Test};
-use super::propose::NO_MACHINE;
+use super::plain_machine::NO_MACHINE;
 
 /// Farthest from zero that a place is assumed, mm: a reflector's usual height above a table.
 const FARTHEST_MM: f64 = 250.0;

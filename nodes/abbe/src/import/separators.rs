@@ -36,7 +36,8 @@ fn of_block(cells: &[String]) -> String {
 /// Where a column stands.
 pub(super) fn place_of(name: &str, head: &[String], separator: Option<char>) -> Result<usize> {
     let mut named = head.iter().enumerate().filter(|(_, cell)| *cell == name);
-    let Some((place, _)) = named.next() else {
+    let first = named.next().map(|(place, _)| place);
+    let Some(place) = first.or_else(|| by_number(name, head.len())) else {
         let remedy = match separator {
             Some(separator) if head.len() == 1 => {
                 format!(" (one column alone: is the separator \"{separator}\"?)")
@@ -52,6 +53,12 @@ pub(super) fn place_of(name: &str, head: &[String], separator: Option<char>) -> 
         bail!("column \"{name}\" is there twice: rename one of them");
     }
     Ok(place)
+}
+
+/// The place of `column 2` in a table whose columns have other names, or names that were given to them.
+fn by_number(name: &str, n_columns: usize) -> Option<usize> {
+    let number: usize = name.strip_prefix("column ")?.parse().ok()?;
+    number.checked_sub(1).filter(|place| *place < n_columns)
 }
 
 /// That no names of columns were found; a separator that is not read is named as the reason.

@@ -7,6 +7,7 @@ use metrology::yaml;
 use reports::whole_file::{self, Vanishing};
 
 use crate::import::map::{Map, Test};
+use crate::import::plain_machine::PlainMachine;
 use crate::import::{self, Named, propose};
 use crate::report_bag::foreign_log::{self, Log};
 
@@ -76,15 +77,23 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
         }
         return Ok(None);
     }
+    of_any(path, map).map(Some)
+}
+
+/// Imports a table for a machine that is wide enough for any.
+///
+/// # Errors
+/// As [`of`].
+pub fn of_any(path: &Path, map: Option<&Path>) -> Result<FromTable> {
     let (described, read) = described(path, map)?;
-    imported(path, described, stand_in(&read)).map(Some)
+    imported(path, described, stand_in(&read))
 }
 
 /// The machine of a table that states none.
 fn stand_in(read: &Map) -> Named {
     Named {
         place: "the machine that is taken where none is stated".to_owned(),
-        text: propose::machine_for(read),
+        text: PlainMachine::of_map(read).text(),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Proposals are maps that are taken.
 
-use super::super::map::Plane;
+use super::super::map::{Map, Plane, Test};
+use super::super::plain_machine::PlainMachine;
 use super::*;
 use machine::MachineFile;
 use metrology::yaml;
@@ -55,7 +56,7 @@ fn a_proposal_is_a_map_of_a_machine_that_can_be_read() {
         ("c.csv", "run,angle_deg,radial_um\n1,0,2\n1,10,3\n", Axis::X),
     ] {
         let (proposal, map) = proposed(name, text);
-        let machine = MachineFile::parse(&machine_for(&map), "machine").unwrap();
+        let machine = MachineFile::parse(&PlainMachine::of_map(&map).text(), "machine").unwrap();
         super::super::limits::check(&map, &machine)
             .unwrap_or_else(|error| panic!("{error:#}: {}", proposal.map));
         let found = match map.test {
