@@ -90,7 +90,7 @@ fn diagnoses_take_forty_lines_and_explain_prints_all() {
     for (bag, lines, begin, table) in [
         (
             "cold_reference",
-            134,
+            137,
             "Where: machine and simulator differ by ",
             "Causes",
         ),

@@ -16,6 +16,7 @@ pub(crate) mod in_common;
 pub(crate) mod in_course;
 pub(crate) mod one_feed;
 pub(crate) mod one_plane;
+pub(crate) mod other_thermometer;
 pub(crate) mod plain;
 pub(crate) mod recalibration;
 pub mod rule;

@@ -55,7 +55,7 @@ pub(crate) fn shifts(scope: &Scope<'_, '_>, thermometers: &[Note]) -> Vec<Instan
     let bends = bends_by(stack);
     let bends = bends.as_deref();
     let ids = found.flat_map(|(channel, found)| {
-        let kept = found.by.iter().map(|one| one.thermometer.clone());
+        let kept = found.thermometers().cloned();
         // Along X the column's bend is in its wider form alone.
         let has_own = move |id: &str| match reads_z(channel) {
             true => is_spindle(id) || bends == Some(id),
@@ -74,16 +74,55 @@ pub(crate) fn shifts(scope: &Scope<'_, '_>, thermometers: &[Note]) -> Vec<Instan
         .collect()
 }
 
+/// Whether an effect is driven by none of the thermometers that the logs go with, so that it is not searched.
+pub(crate) fn is_of_another(stack: &Stack<'_>, instance: &Instance, thermometers: &[Note]) -> bool {
+    if !log::is_of_logs(stack) {
+        return false;
+    }
+    let found = thermometers.iter().filter_map(|note| match note {
+        Note::GoesWith { found, .. } => Some(found),
+        _ => None,
+    });
+    let found = found.flat_map(|found| found.thermometers().map(String::as_str));
+    let mut found = found.peekable();
+    if found.peek().is_none() {
+        return false;
+    }
+    let found: BTreeSet<&str> = found.collect();
+    match instance.kind.id {
+        "spindle_growth" => {
+            let own = match &instance.target {
+                Target::Thermometer(id) => Some(id.clone()),
+                _ => first_at(stack, SensorPlace::SpindleFront)
+                    .or_else(|| first_at(stack, SensorPlace::SpindleRear)),
+            };
+            own.is_some_and(|own| !found.contains(own.as_str()))
+        }
+        "column_bend" => {
+            let [column, ambient] =
+                [SensorPlace::Column, SensorPlace::Ambient].map(|at| first_at(stack, at));
+            let all: Vec<String> = match (column, ambient) {
+                (Some(column), Some(ambient)) => vec![column, ambient],
+                _ => bends_by(stack).into_iter().collect(),
+            };
+            !all.is_empty() && !all.iter().all(|id| found.contains(id.as_str()))
+        }
+        _ => false,
+    }
+}
+
+/// The first thermometer at a place that was read.
+pub(crate) fn first_at(stack: &Stack<'_>, place: SensorPlace) -> Option<String> {
+    let read = &stack.session.history.temperature_degc;
+    let sensors = stack.twin.machine().temperature_sensors.iter();
+    let mut there = sensors.filter(|own| own.place == place && read.contains_key(&own.id));
+    there.next().map(|own| own.id.clone())
+}
+
 /// The thermometer that alone drives the bend of the column, where it is no pair.
 fn bends_by(stack: &Stack<'_>) -> Option<String> {
-    let read = &stack.session.history.temperature_degc;
-    let at = |place: SensorPlace| {
-        let sensors = stack.twin.machine().temperature_sensors.iter();
-        let mut there = sensors.filter(|own| own.place == place && read.contains_key(&own.id));
-        there.next().map(|own| own.id.clone())
-    };
     let [column, ambient, bed] =
-        [SensorPlace::Column, SensorPlace::Ambient, SensorPlace::Bed].map(at);
+        [SensorPlace::Column, SensorPlace::Ambient, SensorPlace::Bed].map(|at| first_at(stack, at));
     match (column, ambient) {
         (Some(_), Some(_)) => None,
         (column, ambient) => column.or(ambient).or(bed),
@@ -139,6 +178,6 @@ fn drivers(stack: &Stack<'_>, instance: &Instance, thermometers: &[Note]) -> Opt
         let mut there = sensors.iter().filter(|sensor| sensor.id == *name);
         there.any(|sensor| places.contains(&sensor.place))
     };
-    let by = seen.flat_map(|(_, found)| &found.by);
-    Some(by.filter(|one| is_there(&one.thermometer)).count())
+    let by = seen.flat_map(|(_, found)| found.thermometers());
+    Some(by.filter(|one| is_there(one)).count())
 }

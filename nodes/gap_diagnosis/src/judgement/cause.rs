@@ -22,7 +22,7 @@ use crate::judgement::rule::Rule;
 use crate::judgement::unknown::{self, Leftover};
 use crate::judgement::veto::{self, Veto};
 use crate::judgement::{self, Check, CheckId};
-use crate::judgement::{in_course, one_feed, one_plane, unresolved};
+use crate::judgement::{in_course, one_feed, one_plane, other_thermometer, unresolved};
 use crate::noise::Noise;
 use crate::noise::normal::Normal;
 use crate::noise::stack::Stack;
@@ -143,6 +143,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let instances = Instance::all(stack.twin.machine(), means);
     let mut instances = Instance::with_begins(instances, scope.begins);
     let thermometers = thermal::notes(stack);
+    instances.retain(|own| !by_thermometer::is_of_another(stack, own, &thermometers));
     instances.extend(by_thermometer::shifts(scope, &thermometers));
     let mut signatures = Library::new(stack, instances);
     lines::add(stack, scope.slots, &mut signatures);
@@ -173,6 +174,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     one_plane::list(stack, &signatures, &mut members);
     by_clock::list_drift(stack, &signatures, &mut members);
     in_course::list(stack, &signatures, &mut members, scope.config);
+    other_thermometer::list(stack, &signatures, &mut members);
     resize(stack, &signatures, &normal, &mut members);
     while leave_out_small(stack, &signatures, &mut members) {
         resize(stack, &signatures, &normal, &mut members);

@@ -14,6 +14,10 @@
 //! less: two bodies that grow against each other show little of either, and the best thermometer alone is then none of the
 //! two. Nothing is chosen by its fit: a run (or a part of one log) is always predicted from the others.
 //!
+//! A body in which heat spreads answers with more than one time. A thermometer is therefore tried with two lags and sizes of one
+//! sign, before another thermometer is, and taken so where that leaves [`WORTH_OF_A_LAG`] of (2) or less. Its lag is then their mean,
+//! weighed by the sizes, and its size their sum.
+//!
 //! A thermometer that moved by less than [`moved::LEAST_MOVED`] times its own noise is not tried (`moved`), and no set with a size above
 //! [`MOST_UM_PER_K`]: the slow change of a room by 0.1 K has the shape of any warm-up.
 //!
@@ -23,7 +27,7 @@
 //! This finds what goes with what. Whether it is a cause, and which, is for the effects of the catalogue to show.
 //!
 //! # Holds when
-//! Three runs or more under one zero: that of most of them is looked at. Neighbouring runs of one log share slow noise, so
+//! Runs are under one zero: that of most of them is looked at. Of one or two runs, thirds of each are left out in turn. Neighbouring runs of one log share slow noise, so
 //! that (3) is rather too good than too bad.
 //!
 //! # References
@@ -36,7 +40,7 @@ use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-use twin::{Channel, History};
+use twin::{Channel, History, Session};
 
 use crate::noise::stack::Stack;
 use crate::report::figures::Note;
@@ -68,14 +72,36 @@ pub struct ThermalFit {
     pub share: f64,
     /// The best two alone, with (3) of each.
     pub alone: Vec<(String, f64)>,
+    /// Thermometers that predict hardly worse in the place of one of the set.
+    #[serde(default)]
+    pub near: Vec<String>,
+}
+
+impl ThermalFit {
+    /// Thermometers that may move the tip: those of the set, and those that predict hardly worse.
+    pub(crate) fn thermometers(&self) -> impl Iterator<Item = &String> {
+        self.by.iter().map(|one| &one.thermometer).chain(&self.near)
+    }
 }
 
 /// Part of (2) that one more thermometer may leave.
 const WORTH: f64 = 0.7;
+/// Part of (2) that a thermometer leaves which predicts hardly worse in the place of another one.
+const NEAR: f64 = 1.5;
+/// Part of (2) that a second lag of a thermometer may leave.
+const WORTH_OF_A_LAG: f64 = 0.7;
+/// Two lags in place of one, over it, before they are refined.
+const TWO_FOR_ONE: [[f64; 2]; 4] = [[0.1, 1.3], [0.3, 1.7], [0.5, 3.0], [0.9, 8.0]];
+/// The best alone that are tried with two lags.
+const MOST_WITH_TWO_LAGS: usize = 3;
 /// Lags of two thermometers together, min.
 const FEWER_LAGS_MIN: [f64; 8] = [0.0, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0];
 /// Thermometers that are tried in twos.
 const MOST_PAIRED: usize = 12;
+/// Runs from which on each is left out as a whole, and parts of each of fewer runs.
+const FEWEST_FOLDS: usize = 3;
+/// Fewest rows of such a part.
+const ROWS_OF_A_PART: usize = 15;
 /// Rows that are looked at; of more every so many.
 const MOST_ROWS: usize = 1200;
 /// Least (3) of a reported fit.
@@ -84,6 +110,8 @@ const MIN_SHARE_EXPLAINED: f64 = 0.5;
 const FIRST_LAG_MIN: f64 = 2.0;
 const LAG_STEP: f64 = 1.3;
 const TRIED_LAGS: i32 = 21;
+/// The longest lag of a machine's body, min.
+const MOST_LAG_MIN: f64 = 480.0;
 /// The largest shift of a tip that a machine has, µm/K.
 const MOST_UM_PER_K: f64 = 50.0;
 /// Factors by which a lag is refined.
@@ -100,10 +128,32 @@ pub fn notes(stack: &Stack<'_>) -> Vec<Note> {
     let of = |(channel, blocks): (&Channel, Vec<&Block>)| {
         Some(Note::GoesWith {
             channel: channel.to_string(),
-            found: Search::new(stack, &blocks)?.found()?,
+            found: Search::new(stack.session, &stack.raw, &blocks)?.found()?,
         })
     };
     channels.into_iter().filter_map(of).collect()
+}
+
+/// The residual of each row, mm, of one channel of logs less what the thermometers predict that it goes with; `None` where it
+/// goes with none.
+pub(crate) fn less_heat(session: &Session, raw: &[f64], blocks: &[&Block]) -> Option<Vec<f64>> {
+    let search = Search::new(session, raw, blocks)?;
+    let best = search.best()?;
+    if best.share() < MIN_SHARE_EXPLAINED {
+        return None;
+    }
+    let lagged: Vec<Vec<f64>> = best.terms.iter().map(|term| search.lagged(*term)).collect();
+    let mut left = raw.to_vec();
+    for block in blocks {
+        let run = &session.runs[block.run];
+        for (row, mm) in block.rows.iter().zip(&mut left[block.range()]) {
+            let at_s = time_s(run, row);
+            let warming_k = lagged.iter().map(|lagged| search.history.at(lagged, at_s));
+            let sizes_um = best.sizes.iter().skip(1);
+            *mm -= 1e-3 * sizes_um.zip(warming_k).map(|(um, k)| um * k).sum::<f64>();
+        }
+    }
+    Some(left)
 }
 
 /// Lagged temperatures that were computed, by thermometer and the bits of the lag.
@@ -122,6 +172,25 @@ struct Search<'s> {
 
 /// A thermometer with its lag, s.
 type Term<'s> = (&'s str, f64);
+
+/// The best set of thermometers.
+struct BestSet<'s> {
+    terms: Vec<Term<'s>>,
+    /// Of the offset, then of each, µm and µm/K.
+    sizes: DVector<f64>,
+    /// (2) of the set, and of the offset alone.
+    left: f64,
+    nothing: f64,
+    /// Each thermometer alone with (2), the best first.
+    alone: Vec<(f64, Term<'s>)>,
+}
+
+impl BestSet<'_> {
+    /// (3).
+    fn share(&self) -> f64 {
+        1.0 - self.left / self.nothing
+    }
+}
 
 /// Sums of squares and products of one run.
 struct Fold {
@@ -147,9 +216,9 @@ impl Sums {
 
 impl<'s> Search<'s> {
     /// None of too few runs for a prediction.
-    fn new(stack: &'s Stack<'_>, blocks: &[&Block]) -> Option<Self> {
+    fn new(session: &'s Session, raw: &[f64], blocks: &[&Block]) -> Option<Self> {
         let zero = |block: &Block| {
-            let segment = &stack.session.runs[block.run].segment;
+            let segment = &session.runs[block.run].segment;
             (segment.setup_id, segment.zero_id)
         };
         let mut zeros = BTreeMap::<(u32, u32), Vec<&Block>>::new();
@@ -157,18 +226,16 @@ impl<'s> Search<'s> {
             zeros.entry(zero(block)).or_default().push(*block);
         }
         let most = zeros.into_values().max_by_key(Vec::len)?;
-        if most.len() < 3 {
-            return None;
-        }
         let every = most.iter().map(|block| block.rows.len()).sum::<usize>() / MOST_ROWS + 1;
         let fold = |block: &&Block| -> Vec<[f64; 2]> {
-            let run = &stack.session.runs[block.run];
-            let rows = block.rows.iter().zip(&stack.raw[block.range()]);
+            let run = &session.runs[block.run];
+            let rows = block.rows.iter().zip(&raw[block.range()]);
             rows.step_by(every)
                 .map(|(row, mm)| [time_s(run, row), 1e3 * mm])
                 .collect()
         };
-        let history = &stack.session.history;
+        let folds = in_parts(most.iter().map(fold).collect())?;
+        let history = &session.history;
         let read = history.temperature_degc.iter();
         let moved = read.filter(|(_, degc)| moved::has_moved(degc));
         Some(Self {
@@ -176,46 +243,86 @@ impl<'s> Search<'s> {
             warming_k: moved
                 .filter_map(|(id, _)| Some((id.as_str(), history.warming_k(id)?)))
                 .collect(),
-            folds: most.iter().map(fold).collect(),
+            folds,
             columns: RefCell::default(),
         })
     }
 
-    /// The best set of thermometers; none that explains less than [`MIN_SHARE_EXPLAINED`].
+    /// What a reader is to know of the best set of thermometers; none that explains less than [`MIN_SHARE_EXPLAINED`].
     fn found(&self) -> Option<ThermalFit> {
+        let best = self.best()?;
+        let errors = self.standard_errors(&best.terms);
+        let by = merged(&best.terms, best.sizes.as_slice());
+        let of = |((id, size, lag_s), error): ((&str, f64, f64), &f64)| GoesWith {
+            thermometer: id.to_owned(),
+            um_per_k: size,
+            standard_error_um_per_k: *error,
+            lag_min: lag_s / 60.0,
+        };
+        let share = |press: f64| 1.0 - press / best.nothing;
+        let named = |(press, (id, _)): &(f64, Term<'s>)| ((*id).to_owned(), share(*press));
+        (best.share() >= MIN_SHARE_EXPLAINED).then(|| ThermalFit {
+            by: by.into_iter().zip(&errors).map(of).collect(),
+            share: best.share(),
+            alone: best.alone.iter().take(2).map(named).collect(),
+            near: self.near(&best),
+        })
+    }
+
+    /// Thermometers that leave [`NEAR`] of what the best set leaves or less in the place of one of it.
+    fn near(&self, best: &BestSet<'s>) -> Vec<String> {
+        let is_other = |id: &&&'s str| best.terms.iter().all(|(own, _)| own != *id);
+        let replaces = |id: &'s str| {
+            best.terms.iter().any(|(own, _)| {
+                let rest: Vec<Term<'s>> = { best.terms.iter() }
+                    .filter(|(known, _)| known != own)
+                    .copied()
+                    .collect();
+                let found = self.at_best_lag(id, &rest);
+                found.is_some_and(|(press, _)| press <= NEAR * best.left)
+            })
+        };
+        let others = self.warming_k.keys().filter(is_other);
+        others
+            .filter(|id| replaces(id))
+            .map(|id| (*id).to_owned())
+            .collect()
+    }
+
+    /// The best set of thermometers.
+    fn best(&self) -> Option<BestSet<'s>> {
         let nothing = self.press(&[])?.0;
-        let share = |press: f64| 1.0 - press / nothing;
         let mut alone = self.beside(&[]);
         alone.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut best = self.refined(vec![alone.first()?.1]);
-        let mut left = self.press(&best)?.0;
+        let single = alone
+            .iter()
+            .take(MOST_WITH_TWO_LAGS)
+            .filter_map(|(_, term)| {
+                let terms = self.with_two_lags(self.refined(vec![*term]));
+                Some((self.press(&terms)?.0, terms))
+            });
+        let (mut left, mut terms) = single.min_by(|a, b| a.0.total_cmp(&b.0))?;
         let larger = self.best_two(&alone).map(|two| self.refined(two));
         for more in [
             larger.clone(),
             larger.and_then(|two| self.with_one_more(two)),
         ] {
             let Some(more) = more else { continue };
+            let more = self.with_two_lags(more);
             let Some((press, _)) = self.press(&more) else {
                 continue;
             };
             if press <= WORTH * left {
-                (best, left) = (more, press);
+                (terms, left) = (more, press);
             }
         }
-        let sizes = self.press(&best)?.1;
-        let errors = self.standard_errors(&best);
-        let by = best.iter().zip(sizes.iter().zip(&errors).skip(1));
-        let of = |((id, lag_s), (size, error)): (&Term<'s>, (&f64, &f64))| GoesWith {
-            thermometer: (*id).to_owned(),
-            um_per_k: *size,
-            standard_error_um_per_k: *error,
-            lag_min: lag_s / 60.0,
-        };
-        let named = |(press, (id, _)): &(f64, Term<'s>)| ((*id).to_owned(), share(*press));
-        (share(left) >= MIN_SHARE_EXPLAINED).then(|| ThermalFit {
-            by: by.map(of).collect(),
-            share: share(left),
-            alone: alone.iter().take(2).map(named).collect(),
+        let sizes = self.press(&terms)?.1;
+        Some(BestSet {
+            terms,
+            sizes,
+            left,
+            nothing,
+            alone,
         })
     }
 
@@ -289,13 +396,47 @@ impl<'s> Search<'s> {
         terms
     }
 
+    /// The terms, those of one lag each, with a second one where it is worth it.
+    fn with_two_lags(&self, mut terms: Vec<Term<'s>>) -> Vec<Term<'s>> {
+        for place in 0..terms.len() {
+            let Some((left, _)) = self.press(&terms) else {
+                break;
+            };
+            let (id, lag_s) = terms[place];
+            let lag_s = lag_s.max(60.0 * FIRST_LAG_MIN);
+            let tried = TWO_FOR_ONE.iter().filter_map(|factors| {
+                let mut two = terms.clone();
+                two[place].1 = factors[0] * lag_s;
+                two.push((id, (factors[1] * lag_s).min(60.0 * MOST_LAG_MIN)));
+                Some((self.press(&two)?.0, two))
+            });
+            let Some((_, mut two)) = tried.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+                continue;
+            };
+            let last = two.len() - 1;
+            for factor in [LAG_STEP, 1.0 / LAG_STEP, REFINED[0], 1.0 / REFINED[0]] {
+                self.step(&mut two, place, factor);
+                self.step(&mut two, last, factor);
+            }
+            if self
+                .press(&two)
+                .is_some_and(|(press, _)| press <= WORTH_OF_A_LAG * left)
+            {
+                terms = two;
+            }
+        }
+        terms
+    }
+
     /// Multiplies one lag by a factor as long as that helps.
     fn step(&self, terms: &mut Vec<Term<'s>>, place: usize, factor: f64) {
         let press = |terms: &[Term<'s>]| self.press(terms).map_or(f64::INFINITY, |found| found.0);
         for _ in 0..8 {
             let mut moved = terms.clone();
             moved[place].1 *= factor;
-            if press(moved.as_slice()) >= press(terms.as_slice()) {
+            if moved[place].1 > 60.0 * MOST_LAG_MIN
+                || press(moved.as_slice()) >= press(terms.as_slice())
+            {
                 return;
             }
             *terms = moved;
@@ -314,23 +455,34 @@ impl<'s> Search<'s> {
         }
         let sizes = whole.gram.cholesky()?.solve(&whole.along);
         let is_of_machine = sizes.iter().skip(1).all(|um| um.abs() <= MOST_UM_PER_K);
-        (press.is_finite() && is_of_machine).then_some((press, sizes))
+        let is_of_one_sign = |(place, (id, _)): (usize, &Term<'s>)| {
+            let first = terms
+                .iter()
+                .position(|(known, _)| known == id)
+                .unwrap_or(place);
+            sizes[1 + first] * sizes[1 + place] >= 0.0
+        };
+        let is_sound = is_of_machine && terms.iter().enumerate().all(is_of_one_sign);
+        (press.is_finite() && is_sound).then_some((press, sizes))
     }
 
-    /// Standard errors of the sizes by the jackknife, of the offset first; zeros where a run cannot be left out.
+    /// Standard errors of the sizes of each thermometer by the jackknife; zeros where a run cannot be left out.
     fn standard_errors(&self, terms: &[Term<'s>]) -> Vec<f64> {
         let whole = self.summed(terms);
         let all: Option<Vec<DVector<f64>>> =
             whole.folds.iter().map(|fold| whole.without(fold)).collect();
         let all = all.unwrap_or_default();
         let n = count(all.len().max(1));
+        let all: Vec<Vec<(&str, f64, f64)>> = { all.iter() }
+            .map(|sizes| merged(terms, sizes.as_slice()))
+            .collect();
         let error = |k: usize| {
-            let sizes = || all.iter().map(|sizes| sizes[k]);
+            let sizes = || all.iter().map(|all| all[k].1);
             let mean = sizes().sum::<f64>() / n;
             let squares: f64 = sizes().map(|size| (size - mean).powi(2)).sum();
             ((n - 1.0) / n * squares).sqrt()
         };
-        (0..=terms.len()).map(error).collect()
+        (0..merged(terms, &[]).len()).map(error).collect()
     }
 
     /// Sums of some terms, of each run and of all.
@@ -352,18 +504,23 @@ impl<'s> Search<'s> {
         Sums { folds, gram, along }
     }
 
+    /// What a thermometer with a lag shows over the whole history, K.
+    fn lagged(&self, (id, lag_s): Term<'s>) -> Vec<f64> {
+        let warming_k = self.warming_k.get(id).map_or(&[][..], Vec::as_slice);
+        if lag_s > 0.0 {
+            self.history.lagged_temperature(warming_k, lag_s)
+        } else {
+            warming_k.to_vec()
+        }
+    }
+
     /// What a thermometer with a lag shows at the rows of all runs, K.
     fn column(&self, (id, lag_s): Term<'s>) -> Rc<[f64]> {
         let key = (id, lag_s.to_bits());
         if let Some(known) = self.columns.borrow().get(&key) {
             return Rc::clone(known);
         }
-        let warming_k = self.warming_k.get(id).map_or(&[][..], Vec::as_slice);
-        let lagged = if lag_s > 0.0 {
-            self.history.lagged_temperature(warming_k, lag_s)
-        } else {
-            warming_k.to_vec()
-        };
+        let lagged = self.lagged((id, lag_s));
         let rows = self.folds.iter().flatten();
         let column: Rc<[f64]> = rows
             .map(|[at_s, _]| self.history.at(&lagged, *at_s))
@@ -371,6 +528,41 @@ impl<'s> Search<'s> {
         let _ = self.columns.borrow_mut().insert(key, Rc::clone(&column));
         column
     }
+}
+
+/// Runs that are left out in turn: as they are from [`FEWEST_FOLDS`] on, of fewer the parts of each; `None` of too few rows.
+fn in_parts(runs: Vec<Vec<[f64; 2]>>) -> Option<Vec<Vec<[f64; 2]>>> {
+    if runs.len() >= FEWEST_FOLDS {
+        return Some(runs);
+    }
+    let parts = |rows: &Vec<[f64; 2]>| -> Vec<Vec<[f64; 2]>> {
+        let size = rows.len().div_ceil(FEWEST_FOLDS).max(1);
+        rows.chunks(size).map(<[_]>::to_vec).collect()
+    };
+    let is_long = runs
+        .iter()
+        .all(|rows| rows.len() >= FEWEST_FOLDS * ROWS_OF_A_PART);
+    is_long.then(|| runs.iter().flat_map(parts).collect())
+}
+
+/// Each thermometer of some terms with its size, the sum of those of its lags, and their mean lag, s; `sizes` has that of the offset
+/// first.
+fn merged<'s>(terms: &[Term<'s>], sizes: &[f64]) -> Vec<(&'s str, f64, f64)> {
+    let mut all: Vec<(&str, f64, f64)> = vec![];
+    for (place, (id, lag_s)) in terms.iter().enumerate() {
+        let size = sizes.get(1 + place).copied().unwrap_or(0.0);
+        match all.iter_mut().find(|(known, ..)| known == id) {
+            Some((_, sum, mean_s)) => {
+                let whole = *sum + size;
+                if whole != 0.0 {
+                    *mean_s = (*sum * *mean_s + size * lag_s) / whole;
+                }
+                *sum = whole;
+            }
+            None => all.push((id, size, *lag_s)),
+        }
+    }
+    all
 }
 
 /// Sums of the rows of a run, the first of which is at `first` in the series.

@@ -19,12 +19,12 @@ use rand_pcg::Pcg64Mcg;
 
 const MACHINE: &str = include_str!("../../../../launch_configs/gap_first/machine.yaml");
 const BED: &str = "  - {id: bed, place: bed, period_s: 10.0}";
-const FRONT: &str = "\n  - {id: spindle_front, place: spindle_front, period_s: 10.0}";
+pub const FRONT: &str = "\n  - {id: spindle_front, place: spindle_front, period_s: 10.0}";
 const REAR: &str = "\n  - {id: rear_bearing, place: spindle_rear, period_s: 60.0}";
 const FRAME: &str = "\n  - {id: frame, place: column, period_s: 4.0}";
 const Z_MM: f64 = 100.0;
 
-fn machine(more_sensors: &str) -> MachineFile {
+pub fn machine(more_sensors: &str) -> MachineFile {
     assert!(MACHINE.contains(BED));
     let text = MACHINE.replace(BED, &format!("{BED}{more_sensors}"));
     MachineFile::parse(&text, "machine.yaml").expect("a machine file")
@@ -35,36 +35,36 @@ fn stamp(time_s: f64) -> Stamp<Host> {
 }
 
 /// A warm-up of so many kelvin with the time constant `warm_s`.
-fn warm_k(rise_k: f64, warm_s: f64, time_s: f64) -> f64 {
+pub fn warm_k(rise_k: f64, warm_s: f64, time_s: f64) -> f64 {
     rise_k * (1.0 - (-time_s / warm_s).exp())
 }
 
 /// What follows it.
-fn lagged_k(rise_k: f64, warm_s: f64, lag_s: f64, time_s: f64) -> f64 {
+pub fn lagged_k(rise_k: f64, warm_s: f64, lag_s: f64, time_s: f64) -> f64 {
     let [slow, fast] = [warm_s, lag_s].map(|tau_s| tau_s * (-time_s / tau_s).exp());
     rise_k * (1.0 - (slow - fast) / (warm_s - lag_s))
 }
 
 /// A log that is being made.
-struct Log {
+pub struct Log {
     builder: SessionBuilder,
     noise: Pcg64Mcg,
 }
 
 impl Log {
-    fn new(machine: &MachineFile, seed: u64) -> Self {
+    pub fn new(machine: &MachineFile, seed: u64) -> Self {
         Self {
             builder: SessionBuilder::new(machine, SessionConfig::default()).expect("a machine"),
             noise: Pcg64Mcg::seed_from_u64(seed),
         }
     }
 
-    fn normal(&mut self, size: f64) -> f64 {
+    pub fn normal(&mut self, size: f64) -> f64 {
         let normal: f64 = StandardNormal.sample(&mut self.noise);
         size * normal
     }
 
-    fn segment(&mut self, run: u32, begin: bool, time_s: f64) {
+    pub fn segment(&mut self, run: u32, begin: bool, time_s: f64) {
         self.builder.take(Input::Segment(TestSegment {
             begin,
             repeat: run - 1,
@@ -75,7 +75,7 @@ impl Log {
         }));
     }
 
-    fn row(&mut self, time_s: f64, um: f64, degc: &[(&str, f64)]) {
+    pub fn row(&mut self, time_s: f64, um: f64, degc: &[(&str, f64)]) {
         let mut commanded = PerAxis::default();
         commanded[Axis::Z] = Z_MM;
         self.builder.take(Input::State(AxisState::standing(
@@ -100,7 +100,7 @@ impl Log {
         }
     }
 
-    fn diagnosed(self, machine: &MachineFile) -> Diagnosis {
+    pub fn diagnosed(self, machine: &MachineFile) -> Diagnosis {
         let (session, account) = self.builder.finish().expect("a session");
         assert_eq!(account.left_out.len(), 0, "{account:?}");
         diagnose(machine, &session, &GapConfig::default()).expect("a diagnosis")
@@ -108,7 +108,7 @@ impl Log {
 }
 
 /// What is named.
-fn named(diagnosis: &Diagnosis) -> Vec<&Cause> {
+pub fn named(diagnosis: &Diagnosis) -> Vec<&Cause> {
     let causes = diagnosis.report.causes.iter();
     causes.filter(|c| c.status != Status::Surrogate).collect()
 }
@@ -218,7 +218,7 @@ fn a_room_that_warms_by_a_tenth_of_a_kelvin_explains_nothing() {
 }
 
 /// How six equal warm-ups are logged.
-struct Logged {
+pub struct Logged {
     rows: u32,
     every_s: f64,
     pause_s: f64,
@@ -227,7 +227,7 @@ struct Logged {
 }
 
 impl Logged {
-    fn diagnosed(&self, machine: &MachineFile) -> Diagnosis {
+    pub fn diagnosed(&self, machine: &MachineFile) -> Diagnosis {
         let mut log = Log::new(machine, 44);
         let mut begin_s = 0.0;
         for run in 1..=6 {
@@ -443,6 +443,7 @@ fn a_growth_is_shown_with_the_digits_that_its_error_justifies() {
             by: vec![by],
             share: 0.9,
             alone: vec![],
+            near: vec![],
         };
         let channel = "length.X".to_owned();
         Note::GoesWith { channel, found }.to_string()

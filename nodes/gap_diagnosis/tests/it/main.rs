@@ -1,6 +1,7 @@
 //! The tests of this crate from outside, in one program.
 
 mod following;
+mod heated_alike;
 mod logs;
 mod long;
 mod schema;
