@@ -23,6 +23,7 @@ mod gap_first;
 mod gap_import;
 mod gap_pair;
 mod gap_parts;
+mod gap_plain;
 mod gap_report;
 mod gap_simulated;
 mod gap_wear;

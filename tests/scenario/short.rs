@@ -96,7 +96,7 @@ fn diagnoses_take_forty_lines_and_explain_prints_all() {
         ),
         (
             "host_clocks",
-            106,
+            109,
             "Where: no gap above the noise floor; ",
             "Gap and noise floor",
         ),

@@ -131,7 +131,8 @@ impl Diagnose {
         let budget = self.budget.as_deref().map(Budget::open).transpose()?;
         let limits = self.limits.open()?;
         let simulated = self.opened_simulated(&machine_file)?;
-        let mut diagnosed = beside(&opened.bags, &simulated.bags, name, text, &config)?;
+        let diagnosed = beside(&opened.bags, &simulated.bags, name, text, &config);
+        let mut diagnosed = diagnosed.map_err(|error| opened.named(&error, &self.bags))?;
         opened.name_as_given(&mut diagnosed, &self.bags);
         simulated.name_simulated(&mut diagnosed, &self.simulated);
         let machine = MachineFile::parse(text, name)?.name;
@@ -155,7 +156,9 @@ impl Diagnose {
             Some(&machine),
             between,
         ));
-        let (json, alarms) = self.judged(limits, &mut page, &diagnosed, (&machine, between))?;
+        // Tables of several machines would be one series in the history.
+        let kept_as = Some(machine.as_str()).filter(|name| *name != no_machine::NAME);
+        let (json, alarms) = self.judged(limits, &mut page, &diagnosed, (kept_as, between))?;
         let on_terminal = self.json.as_deref() == Some(Path::new("-"));
         if on_terminal {
             tell!("{json}");
@@ -174,7 +177,7 @@ impl Diagnose {
         for remark in diagnosed.losses().iter().chain(&diagnosed.remarks) {
             complain!("abbe: {remark}");
         }
-        let kept = self.print_and_keep(&page, &diagnosed, (&opened, machine));
+        let kept = self.print_and_keep(&page, &diagnosed, (&opened, &machine, kept_as));
         let are_whole = opened.is_whole() && simulated.is_whole();
         let code = loss::exit_code(diagnosed.losses().is_empty() && are_whole);
         alarms::ended(alarms.as_ref(), kept, code)
@@ -210,10 +213,10 @@ impl Diagnose {
         limits: Option<Limits>,
         page: &mut Report,
         diagnosed: &Diagnosed,
-        (machine, between): (&str, Option<(i64, i64)>),
+        (machine, between): (Option<&str>, Option<(i64, i64)>),
     ) -> Result<(String, Option<Alarms>)> {
         let mut json = diagnosed.json()?;
-        let of = (Some(machine), between, self.bags[0].as_path());
+        let of = (machine, between, self.bags[0].as_path());
         let judge = |limits: Limits| self.keep.judge_diagnosis(limits, &json, of);
         let alarms = limits.map(judge).transpose()?;
         if let Some(alarms) = &alarms {
@@ -269,15 +272,15 @@ impl Diagnose {
         &self,
         page: &Report,
         diagnosed: &Diagnosed,
-        (opened, machine): (&Opened, String),
+        (opened, machine, kept_as): (&Opened, &str, Option<&str>),
     ) -> Result<()> {
         let conditions = &page.figures["conditions"];
         if let Some(path) = &self.pdf {
-            let head = pdf::Head::of(Some(&machine), conditions);
+            let head = pdf::Head::of(Some(machine), conditions);
             pdf::write(path, &page.html(), &head)?;
         }
         if self.keep.is_wanted() {
-            let mut origin = Origin::of_bags(&opened.bags, Some(machine))?;
+            let mut origin = Origin::of_bags(&opened.bags, kept_as.map(str::to_owned))?;
             if opened.has_tables() {
                 origin.source = listed(&self.bags);
             }

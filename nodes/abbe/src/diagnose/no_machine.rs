@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use abbe_msgs::topics;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use machine::MachineFile;
 use metrology::number::number;
 use metrology::{Axis, PerAxis};
@@ -14,7 +14,7 @@ use crate::import::Named;
 use crate::import::plain_machine::{PlainMachine, UNKNOWN_PLACE, place_in_name};
 
 /// Name of such a machine.
-const NAME: &str = "unnamed_machine";
+pub const NAME: &str = "unnamed_machine";
 /// Begin of messages about its file.
 const PLACE: &str = "the machine that is taken where none is named";
 /// Travel of an axis that no table moves, mm.
@@ -59,7 +59,7 @@ impl Shown {
             }
         }
         let moved = &mut self.moved;
-        reading::read(
+        let reading = reading::read(
             &bag,
             Order::LogTime,
             &[topics::AXES_STATE.name],
@@ -74,6 +74,10 @@ impl Shown {
                 }
             },
         );
+        let lost = reading.lines();
+        if !lost.is_empty() {
+            bail!("a table's bag: {}", lost.join("; "));
+        }
         Ok(())
     }
 
@@ -102,9 +106,15 @@ impl Shown {
             "warning, no machine file: a plain machine is assumed ({travels}; leads of 10 mm; usual drives), so sizes that depend \
              on leads, gains or places are only as right as it; write yours with `abbe new-machine FILE` and name it with --machine"
         )];
-        lines.extend(sensors.iter().map(|(id, place)| {
-            let by = if place_in_name(id).is_some() { "by its name" } else { "for its name has no place" };
-            format!("warning, thermometer {id}: taken to be at {place}, {by}; state it in the machine file")
+        lines.extend(sensors.iter().map(|(id, _)| {
+            match place_in_name(id) {
+                Some(place) => format!(
+                    "warning, thermometer {id}: taken to be at {place}, by its name; state it in the machine file"
+                ),
+                None => format!(
+                    "warning, thermometer {id}: at no place that an effect goes by, for its name has no place; state it in the machine file"
+                ),
+            }
         }));
         Assumed {
             machine: Named {
@@ -116,14 +126,22 @@ impl Shown {
     }
 }
 
-/// A travel that holds what was moved, in whole centimetres; the usual one where nothing was.
+/// A travel that holds what was moved, in whole centimetres; of an axis that stood the usual one, and where it stood.
 fn travel_mm(moved: Option<(f64, f64)>) -> [f64; 2] {
-    match moved.filter(|(low, high)| high > low) {
-        None => USUAL_TRAVEL_MM,
-        Some((low, high)) => [
+    let around = |(low, high): (f64, f64)| {
+        [
             ((low - LEAST_BEYOND_MM) / 10.0).floor() * 10.0,
             ((high + LEAST_BEYOND_MM) / 10.0).ceil() * 10.0,
-        ],
+        ]
+    };
+    let [usual_low, usual_high] = USUAL_TRAVEL_MM;
+    match moved {
+        None => USUAL_TRAVEL_MM,
+        Some((low, high)) if high > low => around((low, high)),
+        Some(stood) => {
+            let [low, high] = around(stood);
+            [usual_low.min(low), usual_high.max(high)]
+        }
     }
 }
 
@@ -136,6 +154,7 @@ mod tests {
         assert_eq!(travel_mm(Some((0.0, 500.0))), [-10.0, 510.0]);
         assert_eq!(travel_mm(Some((-3.5, 12.0))), [-20.0, 30.0]);
         assert_eq!(travel_mm(Some((100.0, 100.0))), USUAL_TRAVEL_MM);
+        assert_eq!(travel_mm(Some((400.0, 400.0))), [-250.0, 410.0]);
         assert_eq!(travel_mm(None), USUAL_TRAVEL_MM);
     }
 
@@ -149,6 +168,6 @@ mod tests {
         let machine = MachineFile::parse(&assumed.machine.text, PLACE).unwrap();
         assert_eq!(machine.temperature_sensors.len(), 2);
         assert!(assumed.lines[1].contains("at spindle_front, by its name"));
-        assert!(assumed.lines[2].contains("at ambient, for its name has no place"));
+        assert!(assumed.lines[2].contains("for its name has no place"));
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use reports::gap::diagnosed::Diagnosed;
 
 use super::bags;
@@ -99,6 +99,16 @@ impl Opened {
     /// Whether every cell of the tables holds a value, and no run of them is missing.
     pub fn is_whole(&self) -> bool {
         self.tables.iter().all(FromTable::is_whole)
+    }
+
+    /// An error with the bags named as they were given.
+    pub fn named(&self, error: &anyhow::Error, given: &[PathBuf]) -> anyhow::Error {
+        let mut text = format!("{error:#}");
+        for (bag, path) in self.bags.iter().zip(given) {
+            let [bag, path] = [bag, path].map(|path| path.display().to_string());
+            text = text.replace(&bag, &path);
+        }
+        anyhow!("{text}")
     }
 
     /// Names a simulator's bags as they were given.

@@ -18,6 +18,8 @@ const LEAST_OF_A_SHAPE: usize = 6;
 /// Readings of gauges lie nearer to zero, and no ball of a probe or artefact is smaller, mm.
 const LEAST_OFF_MM: f64 = 10.0;
 const LEAST_RADIUS_MM: f64 = 1.0;
+/// Columns that change and stay nearer to zero are of a gauge, mm.
+const LEAST_POSITION_MM: f64 = 0.5;
 
 /// The numbers of a line, as text with points before decimals; `None` of any other line.
 fn numbers(line: &str) -> Option<Vec<String>> {
@@ -70,6 +72,15 @@ pub fn is_one(text: &str) -> bool {
     let Some(points) = first_points(text) else {
         return false;
     };
+    // Readings of a gauge go to and fro about zero; a position stands or goes farther.
+    let is_gauge = |axis: usize| {
+        let all = || points.iter().map(|point| point[axis]);
+        let first = points.first().map_or(0.0, |point| point[axis]);
+        all().all(|mm| mm.abs() < LEAST_POSITION_MM) && all().any(|mm| mm.total_cmp(&first).is_ne())
+    };
+    if (0..NUMBERS_A_LINE).any(is_gauge) {
+        return false;
+    }
     let is_far = points.iter().all(|point| point.amax() > LEAST_OFF_MM);
     let lengths = (LEAST_OF_A_SHAPE..=points.len()).rev();
     let mut shapes = lengths.filter_map(|n| touch_shapes::of(&points[..n]).ok());
@@ -147,6 +158,8 @@ mod tests {
             lines(|k| [60.0 * k, 20.0 + 0.1 * k, 0.4 * k]),
             lines(|k| [0.001 * (5.0 * k).sin(), 0.002, 0.001 * k]),
             lines(|k| [k, 2.0 * k, 3.0 * k]),
+            lines(|k| [50.0 * k.cos(), 50.0 * k.sin(), 0.003 * (5.0 * k).sin()]),
+            lines(|k| [500.0, 20.1, 0.002 * (3.0 * k).cos()]),
             sphere(",", '.').replacen("112", "N1", 1),
             "1 2\n".repeat(9),
             String::new(),

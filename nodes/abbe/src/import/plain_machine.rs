@@ -12,27 +12,49 @@ pub const NO_MACHINE: &str = "not_stated";
 /// Travel that holds any table, mm.
 const ANY_TRAVEL_MM: [f64; 2] = [-100_000.0, 100_000.0];
 
-/// Words in names of thermometers, with the place that they are at; the first that is found counts.
-const PLACES_BY_WORD: [(&str, &str); 16] = [
-    ("spindle_rear", "spindle_rear"),
-    ("rear", "spindle_rear"),
-    ("spindle", "spindle_front"),
-    ("nose", "spindle_front"),
-    ("head", "spindle_front"),
-    ("column", "column"),
-    ("bed", "bed"),
-    ("base", "bed"),
-    ("table", "bed"),
-    ("nut_x", "nut_x"),
-    ("screw_x", "nut_x"),
-    ("nut_y", "nut_y"),
-    ("screw_y", "nut_y"),
-    ("nut_z", "nut_z"),
-    ("screw_z", "nut_z"),
-    ("ambient", UNKNOWN_PLACE),
+/// Words in names of thermometers, with the place that they are at; the first row with one of them counts.
+const PLACES_BY_WORD: [(&[&str], &str); 4] = [
+    (
+        &[
+            "column", "ständer", "staender", "säule", "saeule", "montant",
+        ],
+        "column",
+    ),
+    (
+        &["bed", "base", "table", "bett", "tisch", "gestell", "bati"],
+        "bed",
+    ),
+    (
+        &[
+            "spindle",
+            "spindel",
+            "nose",
+            "headstock",
+            "head",
+            "spindelkopf",
+            "bearing",
+            "lager",
+            "spindellager",
+            "broche",
+        ],
+        "spindle_front",
+    ),
+    (
+        &[
+            "ambient", "air", "room", "hall", "shop", "umgebung", "luft", "raum", "halle",
+            "ambiante",
+        ],
+        "ambient",
+    ),
 ];
-/// The place of a thermometer whose name has none.
-pub const UNKNOWN_PLACE: &str = "ambient";
+/// Words for the rear end of a spindle.
+const REAR: [&str; 6] = ["rear", "back", "hinten", "hinteres", "hinterer", "hintere"];
+/// Words for the nut or the screw of an axis.
+const NUTS: [&str; 4] = ["nut", "screw", "mutter", "spindelmutter"];
+/// The place of a thermometer whose name has none: no effect of the catalogue goes with it in a log, but the shift with that thermometer.
+pub const UNKNOWN_PLACE: &str = "nut_x";
+/// The place that stands for any where nothing goes by it.
+const ANY_PLACE: &str = "ambient";
 
 /// Such a machine.
 pub struct PlainMachine {
@@ -66,7 +88,7 @@ impl PlainMachine {
                 .into_iter()
                 .collect(),
             sensors: { sensors.into_iter() }
-                .map(|id: String| (id, UNKNOWN_PLACE))
+                .map(|id: String| (id, ANY_PLACE))
                 .collect(),
         }
     }
@@ -110,11 +132,22 @@ impl PlainMachine {
     }
 }
 
-/// The place that a thermometer's name tells; `None`: none.
+/// The place in a thermometer's name, by its words; `None`: none.
 pub fn place_in_name(id: &str) -> Option<&'static str> {
-    let id = id.to_lowercase().replace(['-', ' '], "_");
-    let known = PLACES_BY_WORD.iter().find(|(word, _)| id.contains(word));
-    known.map(|(_, place)| *place)
+    let id = id.to_lowercase();
+    let words: Vec<&str> = id.split(|letter: char| !letter.is_alphanumeric()).collect();
+    let has = |all: &[&str]| words.iter().any(|word| all.contains(word));
+    if has(&NUTS) {
+        return [("x", "nut_x"), ("y", "nut_y"), ("z", "nut_z")]
+            .into_iter()
+            .find_map(|(letter, place)| has(&[letter]).then_some(place));
+    }
+    let known = PLACES_BY_WORD.iter().find(|(all, _)| has(all));
+    let place = known.map(|(_, place)| *place);
+    match place {
+        Some("spindle_front") if has(&REAR) => Some("spindle_rear"),
+        place => place,
+    }
 }
 
 #[cfg(test)]
@@ -138,14 +171,24 @@ mod tests {
     }
 
     #[test]
-    fn names_of_thermometers_tell_places() {
+    fn a_thermometer_is_at_the_place_in_its_name() {
         for (id, place) in [
             ("spindle_front", Some("spindle_front")),
             ("Spindle rear", Some("spindle_rear")),
+            ("rear_bearing", Some("spindle_rear")),
+            ("Spindellager hinten", Some("spindle_rear")),
+            ("spindel_c", Some("spindle_front")),
             ("T_column", Some("column")),
+            ("rear_column", Some("column")),
             ("nut_y", Some("nut_y")),
+            ("x_nut", Some("nut_x")),
             ("screw-Z", Some("nut_z")),
+            ("nut", None),
             ("ambient_2", Some("ambient")),
+            ("Umgebung", Some("ambient")),
+            ("stable", None),
+            ("overhead", None),
+            ("rear", None),
             ("T7", None),
         ] {
             assert_eq!(place_in_name(id), place, "{id}");

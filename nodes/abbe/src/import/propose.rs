@@ -383,12 +383,12 @@ impl<'t> Text<'t> {
         }
         let mut sensors: Vec<String> = vec![];
         for column in found.all(Role::Temperature) {
-            let id = sensor_id(&column.name, sensors.len());
+            let mut id = sensor_id(&column.name, sensors.len());
             if sensors.is_empty() {
                 self.test.push_str("    temperature_degc:\n");
             }
             if sensors.contains(&id) {
-                continue;
+                id = format!("{id}_column_{}", sensors.len() + 1);
             }
             let _ = writeln!(self.test, "      {id}: {}", quoted(&column.name));
             self.note(&format!("temperature_degc.{id}"), column);
@@ -419,11 +419,17 @@ impl<'t> Text<'t> {
                 let _ = writeln!(self.test, "    feed_mm_min: {feed_mm_min:?}");
                 self.note("feed_mm_min", column);
             }
-            None => self.stated(
-                "feed_mm_min",
-                "1000.0",
-                "feed; what follows from speed depends on it",
-            ),
+            None => match titles::feed_mm_min(found) {
+                Some(feed_mm_min) => {
+                    let _ = writeln!(self.test, "    feed_mm_min: {feed_mm_min:?}");
+                    self.recognised.push(format!("feed {feed_mm_min} mm/min"));
+                }
+                None => self.stated(
+                    "feed_mm_min",
+                    "1000.0",
+                    "feed; what follows from speed depends on it",
+                ),
+            },
         }
         self.column("run", run);
         self.read("angle_deg", angle);

@@ -48,6 +48,14 @@ const ROLE_WORDS: [(Role, &[&str], &[&str]); 9] = [
         &["x", "y", "z"],
     ),
 ];
+/// Words of runs that begin like those of readings.
+const READING_WORDS_OF_RUNS: [&str; 5] = [
+    "messreihe",
+    "messreihen",
+    "messlauf",
+    "messdurchgang",
+    "messzyklus",
+];
 /// First letters of words for statistics, limits, other errors and computed values. A column with such a word has no readings.
 const OF_NO_READING: &[&str] = &[
     "limit",
@@ -136,6 +144,12 @@ pub fn is_no_reading(words: &[String]) -> bool {
 
 /// What a column of numbers holds by the words of its name; one of a length without others holds a displacement.
 pub fn of(words: &[String], is_length: bool) -> Option<Role> {
+    if words
+        .iter()
+        .any(|word| READING_WORDS_OF_RUNS.contains(&word.as_str()))
+    {
+        return Some(Role::Run);
+    }
     let mut roles = ROLE_WORDS.iter().map(|(role, ..)| *role);
     let named = roles.find(|role| words.iter().any(|word| is_of(*role, word)));
     let role = named.or_else(|| is_length.then_some(Role::Displacement))?;
@@ -157,14 +171,60 @@ pub fn n_qualifiers(words: &[String], role: Role) -> usize {
 
 /// Whether a column without a unit is that of a thermometer: named by a place, with numbers that are degrees Celsius.
 pub fn is_warm(words: &[String], numbers: &[f64]) -> bool {
-    const SENSOR_PLACES: [&str; 14] = [
-        "spindle", "bearing", "ambient", "room", "air", "bed", "column", "nut", "coolant", "table",
-        "raum", "luft", "spindel", "bett",
+    const SENSOR_PLACES: [&str; 28] = [
+        "spindle",
+        "bearing",
+        "ambient",
+        "room",
+        "air",
+        "bed",
+        "column",
+        "nut",
+        "coolant",
+        "table",
+        "raum",
+        "luft",
+        "spindel",
+        "bett",
+        "headstock",
+        "head",
+        "nose",
+        "rear",
+        "front",
+        "motor",
+        "base",
+        "hall",
+        "lager",
+        "ständer",
+        "säule",
+        "tisch",
+        "halle",
+        "umgebung",
     ];
-    let named = words
+    let is_sensor = |word: &str| {
+        let number = ["ptc", "pt", "tc", "ntc", "t"]
+            .iter()
+            .find_map(|kind| word.strip_prefix(kind));
+        let is_numbered =
+            |rest: &str| !rest.is_empty() && rest.bytes().all(|one| one.is_ascii_digit());
+        SENSOR_PLACES.contains(&word)
+            || word.starts_with("spindellager")
+            || number.is_some_and(is_numbered)
+    };
+    let named = words.iter().any(|word| is_sensor(word));
+    // A broken wire reads far off, and is left out by its line.
+    let n_warm = numbers
         .iter()
-        .any(|word| SENSOR_PLACES.contains(&word.as_str()));
-    named && !numbers.is_empty() && numbers.iter().all(|degc| (-20.0..=150.0).contains(degc))
+        .filter(|degc| (-20.0..=150.0).contains(*degc))
+        .count();
+    named && !numbers.is_empty() && 10 * n_warm >= 9 * numbers.len()
+}
+
+/// Whether words are those of a nut with the letter of its axis, which is no displacement along it.
+pub fn is_nut(words: &[String]) -> bool {
+    words
+        .iter()
+        .any(|word| matches!(word.as_str(), "nut" | "screw" | "mutter" | "spindelmutter"))
 }
 
 #[cfg(test)]

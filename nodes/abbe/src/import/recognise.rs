@@ -308,6 +308,8 @@ fn known(name: &str, below: Stated, lines: &[(u64, &str)], decimal: char) -> Kno
     };
     let is_bare = unit.is_none() && unknown.is_none();
     let is_place = || is_bare && is_numeric && quantities::is_warm(&words, &numbers);
+    let is_open = role.is_none() || role == Some(Role::Displacement) && quantities::is_nut(&words);
+    let role = role.filter(|_| !(is_open && is_place()));
     let role = role.or_else(|| is_place().then_some(Role::Temperature));
     Known {
         name: name.to_owned(),

@@ -101,6 +101,7 @@ const OF_RADII: &[&str] = &[
     "kugelstab",
     "r",
 ];
+const OF_FEEDS: &[&str] = &["feed", "feedrate", "vorschub", "avance", "avanzamento"];
 /// Words before the date of a measurement.
 const OF_DATES: &[&str] = &[
     "date",
@@ -118,6 +119,8 @@ const OF_DATES: &[&str] = &[
 ];
 /// Dates begin with it, s since 1970: 1990.
 const LEAST_DATE_S: f64 = 631_152_000.0;
+/// Feeds, mm/min: others are no feeds.
+const FEEDS_MM_MIN: [f64; 2] = [1.0, 200_000.0];
 /// Radii of circles, mm: others are no radii.
 const RADII_MM: [f64; 2] = [10.0, 5_000.0];
 
@@ -281,6 +284,45 @@ pub fn radius_mm(found: &Recognised, stem: &str) -> Option<f64> {
     of_lines().or_else(of_stem)
 }
 
+/// The feed that a line above the names states, mm/min; of several with different ones none.
+pub fn feed_mm_min(found: &Recognised) -> Option<f64> {
+    let is_key = |line: &&String| {
+        words(line)
+            .iter()
+            .any(|word| OF_FEEDS.contains(&word.as_str()))
+    };
+    let mut all = lines(found).filter(is_key).filter_map(|line| feed_of(line));
+    let first = all.next()?;
+    all.all(|other| other.total_cmp(&first).is_eq())
+        .then_some(first)
+}
+
+/// The only number of a line, by its unit of speed; mm/min where it has none.
+fn feed_of(line: &str) -> Option<f64> {
+    let plain: String = line.to_lowercase().split_whitespace().collect();
+    let is_part = |letter: char| letter.is_ascii_digit() || letter == '.';
+    let mut numbers = plain
+        .split(|letter: char| !is_part(letter))
+        .filter_map(|part| part.parse::<f64>().ok());
+    let (number, None) = (numbers.next()?, numbers.next()) else {
+        return None;
+    };
+    // The longer word of two that end alike comes first.
+    let units = [
+        ("mm/min", 1.0),
+        ("inch/min", 25.4),
+        ("in/min", 25.4),
+        ("ipm", 25.4),
+        ("m/min", 1000.0),
+        ("mm/s", 60.0),
+        ("/rev", f64::NAN),
+    ];
+    let unit = units.iter().find(|(word, _)| plain.contains(word));
+    let feed = number * unit.map_or(1.0, |(_, factor)| *factor);
+    let [least, most] = FEEDS_MM_MIN;
+    (least..=most).contains(&feed).then_some(feed)
+}
+
 fn in_range(radius_mm: f64) -> Option<f64> {
     let [least, most] = RADII_MM;
     (least..=most).contains(&radius_mm).then_some(radius_mm)
@@ -426,6 +468,27 @@ mod tests {
             assert!(is_one, "{line}: {radius:?}");
         }
         assert_eq!(radius_mm(&found("", CIRCLE), "R150_YZ"), Some(150.0));
+    }
+
+    #[test]
+    fn a_feed_above_the_names_is_taken_by_its_unit() {
+        for (line, wanted) in [
+            ("Feed: 2000 mm/min", Some(2000.0)),
+            ("Feed rate (mm/min): 1500", Some(1500.0)),
+            ("Vorschub 800", Some(800.0)),
+            ("feed_mm_min: 500", Some(500.0)),
+            ("Feedrate = 2 m/min", Some(2000.0)),
+            ("Feed: 100 inch/min", Some(2540.0)),
+            ("Feed: 10 mm/s", Some(600.0)),
+            ("Feed: 0.1 mm/rev", None),
+            ("Feed: 500 and 5000 mm/min", None),
+            ("Feed 0", None),
+            ("Radius: 100 mm", None),
+        ] {
+            assert_eq!(feed_mm_min(&found(line, CIRCLE)), wanted, "{line}");
+        }
+        let two = found("Feed: 500\nFeed: 900", CIRCLE);
+        assert_eq!(feed_mm_min(&two), None);
     }
 
     /// Seconds by `date -u -d "2026-01-05 08:00" +%s`.

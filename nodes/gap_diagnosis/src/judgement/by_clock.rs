@@ -10,7 +10,8 @@
 //!
 //! Where (1) does not hold the drift is shown with that reason: it is not named, and what warms is not known either.
 //!
-//! Where no thermometer was read, a growth or a coolant's step is known by its course in time alone, and the drift is listed with it.
+//! Where no thermometer was read (for a growth: none at the spindle), a growth or a coolant's step is known by its course in time alone,
+//! and the drift is listed with it.
 
 use std::collections::BTreeSet;
 
@@ -19,7 +20,7 @@ use nalgebra::DVector;
 use twin::Channel;
 use twin::effects::{self, Target};
 
-use crate::judgement::by_thermometer::SHIFT;
+use crate::judgement::by_thermometer::{self, SHIFT};
 use crate::judgement::cause::{Best, Member, Scope};
 use crate::judgement::{Check, CheckId, unresolved};
 use crate::noise::stack::Stack;
@@ -30,7 +31,8 @@ use crate::search::signature::Library;
 /// The effect that has no other cause than time.
 const BY_CLOCK: &str = "ambient_drift";
 /// What warms or cools the machine, known by a thermometer or by its course in time.
-const HEAT: [&str; 2] = ["spindle_growth", "coolant"];
+const HEAT: [&str; 2] = [GROWTH, "coolant"];
+const GROWTH: &str = "spindle_growth";
 /// Lags of a body behind the thermometer, min.
 const LAGS_MIN: [f64; 5] = [0.05, 8.0, 25.0, 80.0, 240.0];
 /// The largest shift of a tip that a machine has, µm/K.
@@ -75,11 +77,8 @@ pub(crate) fn check(
     Some(Check::new(CheckId::BeatsHeat, lost >= 0.0).with(lost, 0.0))
 }
 
-/// Lists the slow drift with what warms the machine, where no thermometer was read and one axis.
+/// Lists the slow drift with what warms the machine, where none of its thermometers was read and one axis.
 pub(crate) fn list_drift(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) {
-    if !stack.session.history.temperature_degc.is_empty() {
-        return;
-    }
     let axes: BTreeSet<Axis> = { stack.rows.blocks.iter() }
         .filter_map(|block| match block.channel {
             Channel::Length(axis) => Some(axis),
@@ -89,7 +88,10 @@ pub(crate) fn list_drift(stack: &Stack<'_>, signatures: &Library, members: &mut 
     let sole = axes.first().copied().filter(|_| axes.len() == 1);
     for member in members {
         let instance = &signatures.instances[signatures.forms[member.form].instance];
-        let is_heat = HEAT.contains(&instance.kind.id);
+        let (id, target) = (instance.kind.id, &instance.target);
+        let has_none = stack.session.history.temperature_degc.is_empty()
+            || id == GROWTH && by_thermometer::drivers_of(stack, id, target).is_empty();
+        let is_heat = HEAT.contains(&id) && has_none;
         let axis = match instance.target {
             Target::Axis(axis) => Some(axis),
             _ => sole,

@@ -7,6 +7,7 @@
 use std::collections::BTreeSet;
 
 use machine::file::SensorPlace;
+use metrology::Axis;
 use twin::effects::{self, Target};
 
 use crate::judgement::cause::{Member, Scope};
@@ -89,30 +90,53 @@ pub(crate) fn is_of_another(stack: &Stack<'_>, instance: &Instance, thermometers
         return false;
     }
     let found: BTreeSet<&str> = found.collect();
-    match instance.kind.id {
-        "spindle_growth" => {
-            let own = match &instance.target {
-                Target::Thermometer(id) => Some(id.clone()),
-                _ => first_at(stack, SensorPlace::SpindleFront)
-                    .or_else(|| first_at(stack, SensorPlace::SpindleRear)),
-            };
-            own.is_some_and(|own| !found.contains(own.as_str()))
-        }
-        "column_bend" => {
-            let [column, ambient] =
-                [SensorPlace::Column, SensorPlace::Ambient].map(|at| first_at(stack, at));
-            let all: Vec<String> = match (column, ambient) {
-                (Some(column), Some(ambient)) => vec![column, ambient],
-                _ => bends_by(stack).into_iter().collect(),
-            };
-            !all.is_empty() && !all.iter().all(|id| found.contains(id.as_str()))
-        }
-        _ => false,
+    let own = drivers_of(stack, instance.kind.id, &instance.target);
+    let is_driven = DRIVEN.iter().any(|(driven, _)| *driven == instance.kind.id);
+    is_driven && !own.is_empty() && own.iter().all(|id| !found.contains(id.as_str()))
+}
+
+/// The thermometers that were read and that an effect follows, both of a pair.
+pub(crate) fn drivers_of(stack: &Stack<'_>, id: &str, target: &Target) -> Vec<String> {
+    let at = |place| first_at(stack, place);
+    match (id, target) {
+        (_, Target::Thermometer(id)) => vec![id.clone()],
+        ("spindle_growth", _) => { at(SensorPlace::SpindleFront) }
+            .or_else(|| at(SensorPlace::SpindleRear))
+            .into_iter()
+            .collect(),
+        ("column_bend", _) => match [SensorPlace::Column, SensorPlace::Ambient].map(at) {
+            [Some(column), Some(ambient)] => vec![column, ambient],
+            _ => bends_by(stack).into_iter().collect(),
+        },
+        _ => vec![],
+    }
+}
+
+/// The effect of the catalogue that follows a thermometer in logs along some axes, with its target.
+pub(crate) fn effect_of(
+    stack: &Stack<'_>,
+    thermometer: &str,
+    mut axes: impl Iterator<Item = Axis>,
+) -> (&'static str, String) {
+    let is_at = |place| first_at(stack, place).is_some_and(|id| id == thermometer);
+    let reads_z = axes.any(|axis| axis == Axis::Z);
+    let has_front = first_at(stack, SensorPlace::SpindleFront).is_some();
+    let bends = bends_by(stack).is_some_and(|id| id == thermometer);
+    if reads_z
+        && (is_at(SensorPlace::SpindleFront) || !has_front && is_at(SensorPlace::SpindleRear))
+    {
+        (DRIVEN[0].0, String::new())
+    } else if reads_z && is_at(SensorPlace::SpindleRear) {
+        (DRIVEN[0].0, thermometer.to_owned())
+    } else if reads_z && bends {
+        (DRIVEN[1].0, String::new())
+    } else {
+        (SHIFT, thermometer.to_owned())
     }
 }
 
 /// The first thermometer at a place that was read.
-pub(crate) fn first_at(stack: &Stack<'_>, place: SensorPlace) -> Option<String> {
+fn first_at(stack: &Stack<'_>, place: SensorPlace) -> Option<String> {
     let read = &stack.session.history.temperature_degc;
     let sensors = stack.twin.machine().temperature_sensors.iter();
     let mut there = sensors.filter(|own| own.place == place && read.contains_key(&own.id));

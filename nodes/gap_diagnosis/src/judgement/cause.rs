@@ -136,6 +136,17 @@ impl Best {
     }
 }
 
+/// Lists with each member what reads the same in such a recording and was not in the search.
+fn list_look_alikes(scope: &Scope<'_, '_>, signatures: &Library, members: &mut [Member]) {
+    let stack = scope.stack;
+    unresolved::list_periodic(stack, signatures, members);
+    one_feed::list(stack, signatures, members);
+    one_plane::list(stack, signatures, members);
+    by_clock::list_drift(stack, signatures, members);
+    in_course::list(stack, signatures, members, scope.config);
+    other_thermometer::list(stack, signatures, members);
+}
+
 /// Searches the catalogue.
 pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let stack = scope.stack;
@@ -169,12 +180,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let forms = isolability::forms(&signatures, &normal, &best.set);
     let mut members = veto::judged(scope, &signatures, &normal, &best, &forms, is_closed);
     by_thermometer::check(scope, &signatures, &mut members, &thermometers);
-    unresolved::list_periodic(stack, &signatures, &mut members);
-    one_feed::list(stack, &signatures, &mut members);
-    one_plane::list(stack, &signatures, &mut members);
-    by_clock::list_drift(stack, &signatures, &mut members);
-    in_course::list(stack, &signatures, &mut members, scope.config);
-    other_thermometer::list(stack, &signatures, &mut members);
+    list_look_alikes(scope, &signatures, &mut members);
     resize(stack, &signatures, &normal, &mut members);
     while leave_out_small(stack, &signatures, &mut members) {
         resize(stack, &signatures, &normal, &mut members);

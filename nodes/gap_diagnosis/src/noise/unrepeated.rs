@@ -88,8 +88,8 @@ fn of_channel(
     })
 }
 
-/// Standard deviations of what logs of one zero differ by in their offset and in the end of their drift, mm: at most what is
-/// assumed of logs of which nothing is known.
+/// Standard deviations of what logs of one zero differ by in their offset and in the end of their drift, mm, each run beside what the
+/// others predict of it: at most what is assumed of logs of which nothing is known.
 fn between_logs(
     session: &Session,
     blocks: &[&Block],
@@ -104,25 +104,22 @@ fn between_logs(
     let own = lines.iter().map(|line| line[2]).sum::<f64>() / n.max(1.0);
     let deviation = |square: f64, freedom: f64, own: f64| {
         let assumed_mm = ASSUMED_BETWEEN_UM * 1e-3;
-        if freedom < 1.0 {
-            return assumed_mm;
-        }
         let caution = if freedom < MIN_FREEDOM {
             CAUTION_OF_FEW
         } else {
             CAUTION
         };
         let law = ChiSquared::new(freedom).ok();
-        let doubt = law.map_or(1.0, |law| freedom / law.inverse_cdf(1.0 - caution));
-        let variance = doubt * square / freedom - own;
-        variance.max(own).sqrt().min(assumed_mm)
+        let least = law.map_or(0.0, |law| law.inverse_cdf(1.0 - caution));
+        let variance = square / least - own;
+        let known = Some(variance.max(own).sqrt()).filter(|size| size.is_finite());
+        known.map_or(assumed_mm, |size| size.min(assumed_mm))
     };
     let offsets: f64 = lines.iter().map(|line| (line[0] - mean).powi(2)).sum();
     let drifts: f64 = lines.iter().map(|line| line[1].powi(2)).sum();
-    // The prediction of what goes with temperatures has taken about one of each.
     [
-        deviation(offsets, n - 2.0, own),
-        deviation(drifts, n - 1.0, 3.0 * own),
+        deviation(offsets, n - 1.0, own),
+        deviation(drifts, n, 3.0 * own),
     ]
 }
 
@@ -180,7 +177,7 @@ pub fn notes(session: &Session, noise: &BTreeMap<Channel, Noise>) -> Vec<Note> {
     notes.extend(assumed.map(|(channel, own)| Note::NoiseWithin {
         channel: channel.to_string(),
         sigma_um: 1e3 * own.reading_sigma_mm,
-        between_um: ASSUMED_BETWEEN_UM,
+        between_um: 1e3 * own.between.offset_mm.max(own.between.drift_mm),
         lowers: is_assumed(noise),
     }));
     let parts = session

@@ -312,7 +312,7 @@ fn by_thermometers(f: &mut fmt::Formatter<'_>, channel: &str, found: &ThermalFit
     let alone: Vec<String> = alone.collect();
     write!(
         f,
-        "{channel} goes with {}: on runs left out one by one that explains {:.1} % (the best alone: {})",
+        "{channel} goes with {}: on runs or parts of runs that were left out that explains {:.1} % (the best alone: {})",
         terms.join(", and with "),
         percent(found.share),
         alone.join(", ")
@@ -333,7 +333,7 @@ fn noise_within(
     write!(
         f,
         "{channel}: no test was repeated on it, so its noise is that within a run, {sigma_um:.2} µm; by how much a second \
-         run would differ is not known, {between_um} µm is taken{then}: record the same again, three times in all"
+         run would differ was not seen, {between_um:.2} µm is taken{then}: record the same again, three times in all"
     )
 }
 

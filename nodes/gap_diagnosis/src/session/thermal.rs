@@ -22,7 +22,7 @@
 //! [`MOST_UM_PER_K`]: the slow change of a room by 0.1 K has the shape of any warm-up.
 //!
 //! Sizes are of all runs; their standard errors are those of the jackknife over the runs \[3\], which neighbouring readings that
-//! share noise do not make too small.
+//! share noise do not make too small; of parts of one or two runs they are rather too small.
 //!
 //! This finds what goes with what. Whether it is a cause, and which, is for the effects of the catalogue to show.
 //!
@@ -35,7 +35,7 @@
 //! 1974 (jackknife).
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector};
@@ -47,7 +47,10 @@ use crate::report::figures::Note;
 use crate::search::rows::{Block, count, time_s};
 use crate::session::log;
 
-mod moved;
+pub(crate) mod moved;
+mod sums;
+
+use sums::{Fold, Sums, fold, in_parts, merged};
 
 /// One thermometer of (1).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -98,10 +101,6 @@ const MOST_WITH_TWO_LAGS: usize = 3;
 const FEWER_LAGS_MIN: [f64; 8] = [0.0, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0];
 /// Thermometers that are tried in twos.
 const MOST_PAIRED: usize = 12;
-/// Runs from which on each is left out as a whole, and parts of each of fewer runs.
-const FEWEST_FOLDS: usize = 3;
-/// Fewest rows of such a part.
-const ROWS_OF_A_PART: usize = 15;
 /// Rows that are looked at; of more every so many.
 const MOST_ROWS: usize = 1200;
 /// Least (3) of a reported fit.
@@ -113,7 +112,7 @@ const TRIED_LAGS: i32 = 21;
 /// The longest lag of a machine's body, min.
 const MOST_LAG_MIN: f64 = 480.0;
 /// The largest shift of a tip that a machine has, µm/K.
-const MOST_UM_PER_K: f64 = 50.0;
+pub(crate) const MOST_UM_PER_K: f64 = 50.0;
 /// Factors by which a lag is refined.
 const REFINED: [f64; 3] = [1.12, 1.05, 1.02];
 
@@ -135,22 +134,28 @@ pub fn notes(stack: &Stack<'_>) -> Vec<Note> {
 }
 
 /// The residual of each row, mm, of one channel of logs less what the thermometers predict that it goes with; `None` where it
-/// goes with none.
+/// goes with none. Each run is predicted with sizes from the others, where they are left out as a whole.
 pub(crate) fn less_heat(session: &Session, raw: &[f64], blocks: &[&Block]) -> Option<Vec<f64>> {
     let search = Search::new(session, raw, blocks)?;
     let best = search.best()?;
-    if best.share() < MIN_SHARE_EXPLAINED {
+    if !best.is_found() {
         return None;
     }
+    let sums = search.summed(&best.terms);
+    let of_others = |block: &Block| {
+        let fold = search.runs.iter().position(|run| *run == block.run)?;
+        sums.without(sums.folds.get(fold)?)
+    };
     let lagged: Vec<Vec<f64>> = best.terms.iter().map(|term| search.lagged(*term)).collect();
     let mut left = raw.to_vec();
     for block in blocks {
         let run = &session.runs[block.run];
+        let sizes = of_others(block).unwrap_or_else(|| best.sizes.clone());
         for (row, mm) in block.rows.iter().zip(&mut left[block.range()]) {
             let at_s = time_s(run, row);
             let warming_k = lagged.iter().map(|lagged| search.history.at(lagged, at_s));
-            let sizes_um = best.sizes.iter().skip(1);
-            *mm -= 1e-3 * sizes_um.zip(warming_k).map(|(um, k)| um * k).sum::<f64>();
+            let heat_um = sizes.iter().skip(1).zip(warming_k).map(|(um, k)| um * k);
+            *mm -= 1e-3 * (sizes[0] + heat_um.sum::<f64>());
         }
     }
     Some(left)
@@ -166,6 +171,8 @@ struct Search<'s> {
     warming_k: BTreeMap<&'s str, Vec<f64>>,
     /// Rows of each run: instant, s, and reading, µm.
     folds: Vec<Vec<[f64; 2]>>,
+    /// The runs of the folds; none where these are parts of runs.
+    runs: Vec<usize>,
     /// What a thermometer with a lag shows at the rows of all runs, K, by the bits of the lag.
     columns: RefCell<Columns<'s>>,
 }
@@ -190,27 +197,10 @@ impl BestSet<'_> {
     fn share(&self) -> f64 {
         1.0 - self.left / self.nothing
     }
-}
 
-/// Sums of squares and products of one run.
-struct Fold {
-    gram: DMatrix<f64>,
-    along: DVector<f64>,
-    square: f64,
-}
-
-/// The same of every run, and of all together.
-struct Sums {
-    folds: Vec<Fold>,
-    gram: DMatrix<f64>,
-    along: DVector<f64>,
-}
-
-impl Sums {
-    /// Sizes from all runs but one; none where they are not determined.
-    fn without(&self, fold: &Fold) -> Option<DVector<f64>> {
-        let rest = (&self.gram - &fold.gram).cholesky()?;
-        Some(rest.solve(&(&self.along - &fold.along)))
+    /// Whether it explains enough; a log that shows nothing goes with nothing.
+    fn is_found(&self) -> bool {
+        self.share() >= MIN_SHARE_EXPLAINED
     }
 }
 
@@ -243,6 +233,11 @@ impl<'s> Search<'s> {
             warming_k: moved
                 .filter_map(|(id, _)| Some((id.as_str(), history.warming_k(id)?)))
                 .collect(),
+            runs: if folds.len() == most.len() {
+                most.iter().map(|block| block.run).collect()
+            } else {
+                vec![]
+            },
             folds,
             columns: RefCell::default(),
         })
@@ -261,7 +256,7 @@ impl<'s> Search<'s> {
         };
         let share = |press: f64| 1.0 - press / best.nothing;
         let named = |(press, (id, _)): &(f64, Term<'s>)| ((*id).to_owned(), share(*press));
-        (best.share() >= MIN_SHARE_EXPLAINED).then(|| ThermalFit {
+        best.is_found().then(|| ThermalFit {
             by: by.into_iter().zip(&errors).map(of).collect(),
             share: best.share(),
             alone: best.alone.iter().take(2).map(named).collect(),
@@ -272,14 +267,21 @@ impl<'s> Search<'s> {
     /// Thermometers that leave [`NEAR`] of what the best set leaves or less in the place of one of it.
     fn near(&self, best: &BestSet<'s>) -> Vec<String> {
         let is_other = |id: &&&'s str| best.terms.iter().all(|(own, _)| own != *id);
+        let own: BTreeSet<&'s str> = best.terms.iter().map(|(id, _)| *id).collect();
         let replaces = |id: &'s str| {
-            best.terms.iter().any(|(own, _)| {
-                let rest: Vec<Term<'s>> = { best.terms.iter() }
-                    .filter(|(known, _)| known != own)
-                    .copied()
-                    .collect();
-                let found = self.at_best_lag(id, &rest);
-                found.is_some_and(|(press, _)| press <= NEAR * best.left)
+            own.iter().any(|own| {
+                let rest = best.terms.iter().filter(|(known, _)| known != own);
+                let rest: Vec<Term<'s>> = rest.copied().collect();
+                let Some((press, term)) = self.at_best_lag(id, &rest) else {
+                    return false;
+                };
+                let is_near = |press: f64| press <= NEAR * best.left;
+                if is_near(press) {
+                    return true;
+                }
+                // With two lags it may be as good.
+                let two = self.with_two_lags([rest, vec![term]].concat());
+                self.press(&two).is_some_and(|(press, _)| is_near(press))
             })
         };
         let others = self.warming_k.keys().filter(is_other);
@@ -528,59 +530,4 @@ impl<'s> Search<'s> {
         let _ = self.columns.borrow_mut().insert(key, Rc::clone(&column));
         column
     }
-}
-
-/// Runs that are left out in turn: as they are from [`FEWEST_FOLDS`] on, of fewer the parts of each; `None` of too few rows.
-fn in_parts(runs: Vec<Vec<[f64; 2]>>) -> Option<Vec<Vec<[f64; 2]>>> {
-    if runs.len() >= FEWEST_FOLDS {
-        return Some(runs);
-    }
-    let parts = |rows: &Vec<[f64; 2]>| -> Vec<Vec<[f64; 2]>> {
-        let size = rows.len().div_ceil(FEWEST_FOLDS).max(1);
-        rows.chunks(size).map(<[_]>::to_vec).collect()
-    };
-    let is_long = runs
-        .iter()
-        .all(|rows| rows.len() >= FEWEST_FOLDS * ROWS_OF_A_PART);
-    is_long.then(|| runs.iter().flat_map(parts).collect())
-}
-
-/// Each thermometer of some terms with its size, the sum of those of its lags, and their mean lag, s; `sizes` has that of the offset
-/// first.
-fn merged<'s>(terms: &[Term<'s>], sizes: &[f64]) -> Vec<(&'s str, f64, f64)> {
-    let mut all: Vec<(&str, f64, f64)> = vec![];
-    for (place, (id, lag_s)) in terms.iter().enumerate() {
-        let size = sizes.get(1 + place).copied().unwrap_or(0.0);
-        match all.iter_mut().find(|(known, ..)| known == id) {
-            Some((_, sum, mean_s)) => {
-                let whole = *sum + size;
-                if whole != 0.0 {
-                    *mean_s = (*sum * *mean_s + size * lag_s) / whole;
-                }
-                *sum = whole;
-            }
-            None => all.push((id, size, *lag_s)),
-        }
-    }
-    all
-}
-
-/// Sums of the rows of a run, the first of which is at `first` in the series.
-fn fold(rows: &[[f64; 2]], first: usize, series: &[Rc<[f64]>]) -> Fold {
-    let columns = series.len() + 1;
-    let mut fold = Fold {
-        gram: DMatrix::zeros(columns, columns),
-        along: DVector::zeros(columns),
-        square: 0.0,
-    };
-    // Every run counts alike, however many rows it has.
-    let weight = 1.0 / count(rows.len().max(1));
-    for ([_, um], at) in rows.iter().zip(first..) {
-        let told = series.iter().map(|series| series[at]);
-        let row = DVector::from_iterator(columns, std::iter::once(1.0).chain(told));
-        fold.gram.ger(weight, &row, &row, 1.0);
-        fold.along.axpy(weight * um, &row, 1.0);
-        fold.square += weight * um * um;
-    }
-    fold
 }

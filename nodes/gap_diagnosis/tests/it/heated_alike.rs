@@ -12,6 +12,7 @@ use gap_diagnosis::report::Cause;
 
 use super::logs::{FRONT, Log, lagged_k, machine, named, warm_k};
 
+const COLUMN: &str = "\n  - {id: column, place: column, period_s: 10.0}";
 const NUT: &str = "\n  - {id: nut_z, place: nut_z, period_s: 10.0}";
 
 fn swing_k(size_k: f64, period_s: f64, lag_s: f64, time_s: f64) -> f64 {
@@ -114,4 +115,56 @@ fn a_thermometer_that_is_heated_alike_is_listed_with_the_one_that_is_named() {
         ("spindle_growth", "")
     };
     assert!(lists(cause, other.0, other.1), "{cause:#?}");
+}
+
+/// A column that warms on four mornings beside air that stays as it is: the air explains nothing, and the column is found all the same.
+#[test]
+fn a_column_beside_steady_air_is_found_by_its_thermometer() {
+    let machine = machine(COLUMN);
+    let mut log = Log::new(&machine, 94);
+    for (run, rise_k) in [(1, 4.0), (2, 2.5), (3, 6.0), (4, 3.0)] {
+        let begin_s = 86_400.0 * f64::from(run - 1);
+        log.segment(run, true, begin_s);
+        for minute in 0..120 {
+            let since_s = 60.0 * f64::from(minute);
+            let um = -3.0 * lagged_k(rise_k, 2400.0, 900.0, since_s) + log.normal(0.15);
+            let column = 20.0 + warm_k(rise_k, 2400.0, since_s) + log.normal(0.02);
+            let air = 20.0 + log.normal(0.02);
+            log.row(
+                begin_s + since_s,
+                um,
+                &[("column", column), ("ambient", air)],
+            );
+        }
+        log.segment(run, false, begin_s + 7140.0);
+    }
+    let diagnosis = log.diagnosed(&machine);
+    let names = names(&diagnosis);
+    let is_of_column = |(effect, axis): &(&str, &str)| {
+        *effect == "column_bend" || (*effect, *axis) == ("thermal_shift", "column")
+    };
+    assert!(names.iter().any(is_of_column), "{names:?}");
+}
+
+/// A spindle that warms unread beside air that is read: by its course in time alone it may be a drift.
+#[test]
+fn a_growth_without_a_thermometer_at_the_spindle_is_listed_with_the_drift() {
+    let machine = machine("");
+    let mut log = Log::new(&machine, 95);
+    log.segment(1, true, 0.0);
+    for minute in 0..=180 {
+        let at_s = 60.0 * f64::from(minute);
+        let um = -2.0 * lagged_k(8.0, 2400.0, 1200.0, at_s) + log.normal(0.1);
+        let air = 20.0 + swing_k(0.2, 5000.0, 0.0, at_s) + log.normal(0.02);
+        log.row(at_s, um, &[("ambient", air)]);
+    }
+    log.segment(1, false, 10_800.0);
+    let diagnosis = log.diagnosed(&machine);
+    for cause in named(&diagnosis) {
+        let is_growth = cause.effect == "spindle_growth";
+        assert!(
+            !is_growth || lists(cause, "ambient_drift", "Z"),
+            "{cause:#?}"
+        );
+    }
 }

@@ -11,7 +11,7 @@ pub const COVERAGE_FACTOR: f64 = 2.0;
 pub struct ExpandedLength {
     /// The figure, mm.
     pub value_mm: f64,
-    /// Expanded uncertainty with the coverage factor [`COVERAGE_FACTOR`], mm.
+    /// Expanded uncertainty, mm; the coverage factor is [`COVERAGE_FACTOR`] where the figure's owner states no other one.
     pub expanded_uncertainty_mm: f64,
 }
 
@@ -25,7 +25,7 @@ impl ExpandedLength {
         }
     }
 
-    /// Standard uncertainty, mm.
+    /// Standard uncertainty, mm, of a figure with that coverage factor.
     #[must_use]
     pub const fn standard_uncertainty_mm(&self) -> f64 {
         self.expanded_uncertainty_mm / COVERAGE_FACTOR

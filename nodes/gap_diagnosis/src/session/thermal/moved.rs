@@ -19,7 +19,7 @@ const FEWEST_JUDGED: usize = 24;
 const PER_MEDIAN: f64 = 1.4826;
 
 /// Whether a series of temperatures, °C, shows more than noise; of very few readings this is taken for granted.
-pub(super) fn has_moved(degc: &[f64]) -> bool {
+pub(crate) fn has_moved(degc: &[f64]) -> bool {
     let mut read: Vec<f64> = degc.iter().copied().filter(|t| t.is_finite()).collect();
     read.dedup();
     if read.len() < FEWEST_JUDGED {

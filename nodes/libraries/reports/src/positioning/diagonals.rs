@@ -209,11 +209,11 @@ fn coverage(result: &DiagonalsResult, measured: &Measured) -> String {
         result.reversal_coverage_factor,
     ];
     let of_error = if measured.are_lengths_stated {
-        format!("of E_d {of_error:.2}, ")
+        format!("of E_d k = {of_error:.2}, ")
     } else {
         String::new()
     };
-    format!(" (± U, k = 2, {of_error}of B_d {of_reversal:.2}, where limits are most of U)")
+    format!(" (± U, k = 2; {of_error}of B_d k = {of_reversal:.2}, by their distributions)")
 }
 
 /// Mean deviation of both directions over the distance along each diagonal.
@@ -256,7 +256,7 @@ fn of_diagonals(result: &DiagonalsResult, measured: &Measured) -> Rows {
         head: head(&["diagonal / µm", "too long by", "E", "B", "R", "A"]),
         rows: result.diagonals.iter().map(row).collect(),
         note: format!(
-            "{} All too long alike: a scale error; unlike: squareness.",
+            "{} All too long alike: a scale error; unlike: squareness. U of E_d and B_d above has the k of its distribution.",
             measured.uncertainty_note()
         ),
     }
