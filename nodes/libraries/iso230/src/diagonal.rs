@@ -173,27 +173,14 @@ pub fn evaluate(
         .map(one)
         .collect::<Result<_, Iso230Error>>()?;
     let (means, diagonals): (Vec<_>, Vec<_>) = found.into_iter().unzip();
-    let of = |figure: fn(&PositioningResult) -> ExpandedLength,
-              factor: fn(&PositioningResult, &PositioningBudget) -> f64| {
-        let by_value = |a: &&DiagonalResult, b: &&DiagonalResult| {
-            let [a, b] = [a, b].map(|one| figure(&one.positioning).value_mm);
-            a.total_cmp(&b)
-        };
-        // The diagonal that has the greatest has its uncertainty too.
-        let most = diagonals.iter().max_by(by_value);
-        most.map_or((ExpandedLength::new(0.0, 0.0), COVERAGE_FACTOR), |one| {
-            let (found, k) = (figure(&one.positioning), factor(&one.positioning, budget));
-            let expanded_uncertainty_mm = k * found.standard_uncertainty_mm();
-            let figure = ExpandedLength {
-                expanded_uncertainty_mm,
-                ..found
-            };
-            (figure, k)
-        })
-    };
-    let (systematic_error, systematic_error_coverage_factor) =
-        of(|p| p.systematic_error, factor_of_systematic);
-    let (reversal, reversal_coverage_factor) = of(|p| p.reversal, factor_of_reversal);
+    let (systematic_error, systematic_error_coverage_factor) = greatest(
+        &diagonals,
+        budget,
+        |p| p.systematic_error,
+        factor_of_systematic,
+    );
+    let (reversal, reversal_coverage_factor) =
+        greatest(&diagonals, budget, |p| p.reversal, factor_of_reversal);
     let (ends, means) = (means.iter().filter_map(|of| of.last()), means.concat());
     let lengths: Vec<Mean> = { ends.zip(&diagonals) }
         .map(|(end, of)| Mean {
@@ -210,6 +197,28 @@ pub fn evaluate(
         lengths: range(&lengths, budget, 1.0),
         diagonals,
     })
+}
+
+/// The greatest figure of the diagonals with U and k of the diagonal that has it.
+fn greatest(
+    diagonals: &[DiagonalResult],
+    budget: &PositioningBudget,
+    figure: fn(&PositioningResult) -> ExpandedLength,
+    factor: fn(&PositioningResult, &PositioningBudget) -> f64,
+) -> (ExpandedLength, f64) {
+    let by_value = |a: &&DiagonalResult, b: &&DiagonalResult| {
+        let [a, b] = [a, b].map(|one| figure(&one.positioning).value_mm);
+        a.total_cmp(&b)
+    };
+    let Some(one) = diagonals.iter().max_by(by_value) else {
+        return (ExpandedLength::new(0.0, 0.0), COVERAGE_FACTOR);
+    };
+    let (found, k) = (figure(&one.positioning), factor(&one.positioning, budget));
+    let figure = ExpandedLength {
+        expanded_uncertainty_mm: k * found.standard_uncertainty_mm(),
+        ..found
+    };
+    (figure, k)
 }
 
 /// k of E of one diagonal, of the parts over the distance of its extremes.
