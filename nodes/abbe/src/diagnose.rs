@@ -159,15 +159,8 @@ impl Diagnose {
         // Tables of several machines would be one series in the history.
         let kept_as = Some(machine.as_str()).filter(|name| *name != no_machine::NAME);
         let (json, alarms) = self.judged(limits, &mut page, &diagnosed, (kept_as, between))?;
-        let on_terminal = self.json.as_deref() == Some(Path::new("-"));
-        if on_terminal {
-            tell!("{json}");
-        } else if self.full || self.explain {
-            tell!("{}", page.terminal());
-        } else {
-            tell!("{}", page.short(&Room::with_page(self.html.as_deref())));
-        }
-        self.write(&page, &json, on_terminal)?;
+        self.print(&page, &json);
+        self.write(&page, &json)?;
         self.write_machine(&diagnosed, name, text)?;
         if let Some(round) = &round {
             for line in round.write(&diagnosed.diagnosis.report)? {
@@ -240,8 +233,24 @@ impl Diagnose {
         Ok(round)
     }
 
+    fn has_json_on_terminal(&self) -> bool {
+        self.json.as_deref() == Some(Path::new("-"))
+    }
+
+    /// Prints the JSON, all tables or the answer with three of them.
+    fn print(&self, page: &Report, json: &str) {
+        if self.has_json_on_terminal() {
+            tell!("{json}");
+        } else if self.full || self.explain {
+            tell!("{}", page.terminal());
+        } else {
+            tell!("{}", page.short(&Room::with_page(self.html.as_deref())));
+        }
+    }
+
     /// Writes JSON and page.
-    fn write(&self, page: &Report, json: &str, on_terminal: bool) -> Result<()> {
+    fn write(&self, page: &Report, json: &str) -> Result<()> {
+        let on_terminal = self.has_json_on_terminal();
         for (path, contents) in [
             (self.json.as_ref().filter(|_| !on_terminal), json),
             (self.html.as_ref(), page.html().as_str()),

@@ -151,11 +151,15 @@ mod tests {
 
     #[test]
     fn a_travel_holds_what_was_moved_and_is_the_usual_one_else() {
-        assert_eq!(travel_mm(Some((0.0, 500.0))), [-10.0, 510.0]);
-        assert_eq!(travel_mm(Some((-3.5, 12.0))), [-20.0, 30.0]);
-        assert_eq!(travel_mm(Some((100.0, 100.0))), USUAL_TRAVEL_MM);
-        assert_eq!(travel_mm(Some((400.0, 400.0))), [-250.0, 410.0]);
-        assert_eq!(travel_mm(None), USUAL_TRAVEL_MM);
+        for (moved, wanted) in [
+            (Some((0.0, 500.0)), "[-10.0, 510.0]"),
+            (Some((-3.5, 12.0)), "[-20.0, 30.0]"),
+            (Some((100.0, 100.0)), "[-250.0, 250.0]"),
+            (Some((400.0, 400.0)), "[-250.0, 410.0]"),
+            (None, "[-250.0, 250.0]"),
+        ] {
+            assert_eq!(format!("{:?}", travel_mm(moved)), wanted);
+        }
     }
 
     #[test]

@@ -166,7 +166,8 @@ mod tests {
         };
         let machine = MachineFile::parse(&plain.text(), "machine.yaml").unwrap();
         assert_eq!(machine.axes.len(), 5);
-        assert_eq!(machine.linear(Axis::X).unwrap().travel_mm, [-10.0, 510.0]);
+        let travel_mm = machine.linear(Axis::X).unwrap().travel_mm;
+        assert_eq!(format!("{travel_mm:?}"), "[-10.0, 510.0]");
         assert_eq!(machine.temperature_sensors[0].id, "rear_bearing");
     }
 
