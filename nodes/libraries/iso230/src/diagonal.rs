@@ -15,9 +15,9 @@
 //! needs deviations that are zero at the same corner's end of each.
 //!
 //! E_d and B_d have the standard uncertainty of the diagonal that has them, equations (2) and (6) of
-//! [`positioning::budget`](super::positioning::budget). Over a diagonal most of it is limits, of temperatures and
+//! [`super::positioning::budget`]. Over a diagonal most of it is limits, of temperatures and
 //! coefficients for E_d, of slow drift for B_d, and 2 u of limits holds more than 2 u of a normal distribution. Their U
-//! is therefore k u, with k of their sum, (7) of [`budget`](super::budget), 1.65 to 2. Of two means on different diagonals, l₁ and l₂ from
+//! is therefore k u, with k of their sum, (7) of [`super::budget`], 1.65 to 2. Of two means on different diagonals, l₁ and l₂ from
 //! their zeros, one device and one machine have read both. The certificate states (U₀ + U₁ l)² = U₀² + 2 U₀ U₁ l + (U₁ l)² of
 //! each length. The last is the error that grows as the length, the scale's: common to both, it counts for l₁ − l₂. The two
 //! others and the alignment are new on each diagonal:
