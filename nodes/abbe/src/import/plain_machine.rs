@@ -191,6 +191,7 @@ mod tests {
             ("overhead", None),
             ("rear", None),
             ("T7", None),
+            ("spindle_1_no_2", Some("spindle_front")),
         ] {
             assert_eq!(place_in_name(id), place, "{id}");
         }

@@ -388,7 +388,7 @@ impl<'t> Text<'t> {
                 self.test.push_str("    temperature_degc:\n");
             }
             if sensors.contains(&id) {
-                id = format!("{id}_column_{}", sensors.len() + 1);
+                id = format!("{id}_no_{}", sensors.len() + 1);
             }
             let _ = writeln!(self.test, "      {id}: {}", quoted(&column.name));
             self.note(&format!("temperature_degc.{id}"), column);

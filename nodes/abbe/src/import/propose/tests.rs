@@ -280,3 +280,39 @@ fn a_table_of_too_many_columns_is_refused_with_number_and_limit() {
         );
     }
 }
+
+#[test]
+fn thermometers_of_one_word_and_those_without_a_unit_are_all_read() {
+    let log = |names: &str| {
+        let n = names.split(',').count();
+        let row = |k: u32| format!("{},0.{k}{}\n", 60 * k, ",20.5".repeat(n));
+        let rows: String = (0..8).map(row).collect();
+        proposed("log.csv", &format!("time_s,z_um,{names}\n{rows}"))
+            .0
+            .map
+    };
+    let map = log("spindle 1,spindle_1,spindle-1");
+    for id in [
+        "spindle_1: \"spindle 1\"",
+        "spindle_1_no_2: \"spindle_1\"",
+        "spindle_1_no_3: \"spindle-1\"",
+    ] {
+        assert!(map.contains(id), "{id}: {map}");
+    }
+    let map = log("nut_x,T7,PT100-B,headstock");
+    for id in ["nut_x: ", "t7: ", "pt100_b: ", "headstock: "] {
+        assert!(map.contains(&format!("      {id}")), "{id}: {map}");
+    }
+    assert!(map.contains("displacement_um: \"z_um\""), "{map}");
+}
+
+#[test]
+fn a_series_of_readings_numbers_runs() {
+    let text = "Messreihe;Richtung;Sollwert mm;Messwert um\n1;auf;0;0,5\n1;auf;50;1,5\n";
+    let (proposal, _) = proposed("a.csv", &text.replace("auf", "up"));
+    assert!(
+        proposal.map.contains("run: \"Messreihe\""),
+        "{}",
+        proposal.map
+    );
+}
