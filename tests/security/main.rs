@@ -21,7 +21,7 @@ use abbe_tests::program::{Ended, Process, command, domain, root};
 use abbe_tests::python::interpreter;
 use abbe_tests::said::compensation;
 use abbe_tests::scenario::{Scenario, mcap_file};
-use abbe_tests::security::{enforce, keystore};
+use abbe_tests::security::{enforce, keystore, met_in_secret};
 use recorder::{Bag, Event, Order};
 
 /// What the stranger asks for on X, m: no model of this short cell gives as much.
@@ -138,15 +138,11 @@ fn fast_dds_with_an_operators_credentials_hears_and_asks_and_may_not_compensate(
         return;
     }
     let operator = keys.join("enclaves/operator");
-    let Some(mut peer) = FastDds::start_in(test, domain, &operator) else {
+    let cell = (&scenario, domain, keys.as_path());
+    let met = met_in_secret(cell, || FastDds::start_in(test, domain, &operator));
+    let Some((node, mut peer)) = met else {
         return;
     };
-    let file = scenario.argument("fake_cnc.yaml");
-    let arguments = ["node", "fake_cnc", "--ros-args", "--params-file", &file];
-    let mut node = command(domain, &arguments);
-    enforce(&mut node, &keys);
-    let node = Process::start(node);
-    peer.read(&topics::AXES_STATE);
     let state = peer.sample(&topics::AXES_STATE, |_| true);
     assert!(!state.commanded.is_empty(), "{state:?}");
     let service = "/fake_cnc/get_state";

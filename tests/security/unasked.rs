@@ -3,10 +3,10 @@
 use abbe_msgs::topics;
 use abbe_tests::fast_dds::FastDds;
 use abbe_tests::graph::now;
-use abbe_tests::program::{Process, command, domain};
+use abbe_tests::program::domain;
 use abbe_tests::said::compensation;
 use abbe_tests::scenario::Scenario;
-use abbe_tests::security::{enforce, keystore};
+use abbe_tests::security::{keystore, met_in_secret};
 
 use crate::{BEAT, INJECTED_M};
 
@@ -35,22 +35,19 @@ fn an_operator_that_does_not_ask_its_permissions_is_not_followed() {
     }
     let [operator, own] =
         ["operator", "axis_compensation"].map(|of| keys.join("enclaves").join(of));
-    let Some(mut peer) = FastDds::start_unasked(test, domain, &operator) else {
+    let cell = (&scenario, domain, keys.as_path());
+    let met = met_in_secret(cell, || FastDds::start_unasked(test, domain, &operator));
+    let Some((node, mut peer)) = met else {
         return;
     };
-    let file = scenario.argument("fake_cnc.yaml");
-    let arguments = ["node", "fake_cnc", "--ros-args", "--params-file", &file];
-    let mut node = command(domain, &arguments);
-    enforce(&mut node, &keys);
-    let node = Process::start(node);
-    peer.read(&topics::AXES_STATE);
     peer.speak_to_nobody(&topics::COMPENSATION);
     let by_operator_m = moved_m(&mut peer);
     assert!(!peer.was_refused(&topics::COMPENSATION), "it asked");
     drop(peer);
+    node.stop();
 
-    let mut peer = FastDds::start_in(test, domain, &own).unwrap();
-    peer.read(&topics::AXES_STATE);
+    let met = met_in_secret(cell, || FastDds::start_in(test, domain, &own));
+    let (node, mut peer) = met.unwrap();
     peer.speak(&topics::COMPENSATION);
     let by_right_m = moved_m(&mut peer);
     node.stop();

@@ -344,7 +344,24 @@ impl FastDds {
         self.reply::<V>(service, number)
     }
 
+    /// Listens to a topic of ours; `false`: nobody who speaks there was met in time.
+    ///
+    /// # Panics
+    /// When Fast DDS has ended.
+    pub fn meets<M: Message>(&mut self, topic: &Topic<M>) -> bool {
+        let (name, dds_type) = (dds_topic(topic), names::dds_type(M::TYPE_NAME));
+        self.say(&format!("reader {name} {dds_type} {}", quality(topic)));
+        self.in_time(&format!("matched {name}"), |_| true).is_some()
+    }
+
     fn wait(&mut self, start: &str, pick: impl Fn(&str) -> bool) -> String {
+        let found = self.in_time(start, pick);
+        let heard = &self.heard;
+        found.unwrap_or_else(|| panic!("{start}: not within {PATIENCE:?}; heard {heard:#?}"))
+    }
+
+    /// The first line that begins so and that `pick` takes; `None`: there was none in time.
+    fn in_time(&mut self, start: &str, pick: impl Fn(&str) -> bool) -> Option<String> {
         let deadline = Instant::now() + PATIENCE;
         loop {
             let found = self
@@ -352,7 +369,7 @@ impl FastDds {
                 .iter()
                 .position(|line| line.starts_with(start) && pick(line));
             if let Some(place) = found {
-                return self.kept.remove(place);
+                return Some(self.kept.remove(place));
             }
             // What is not picked now is of no use later.
             self.kept
@@ -364,9 +381,7 @@ impl FastDds {
                     *self.heard.entry(what.join(" ")).or_default() += 1;
                     self.kept.push(line);
                 }
-                Err(RecvTimeoutError::Timeout) => {
-                    panic!("{start}: not within {PATIENCE:?}; heard {:#?}", self.heard)
-                }
+                Err(RecvTimeoutError::Timeout) => return None,
                 Err(RecvTimeoutError::Disconnected) => panic!("{start}: Fast DDS has ended"),
             }
         }

@@ -167,7 +167,11 @@ impl Record {
 /// process can still speak.
 fn watch(capture: &Capture, interruption: &Interruption) -> Result<Option<Alarm>> {
     let mut trouble = None;
+    let mut undecoded = node_runtime::Undecoded::default();
     while !interruption.wait(DISK_PERIOD) {
+        if let Some(news) = undecoded.news() {
+            complain!("abbe: {news}");
+        }
         let stats = capture.stats();
         if node_runtime::deafness().is_some() {
             break;

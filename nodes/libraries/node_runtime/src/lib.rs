@@ -35,7 +35,7 @@ pub use diagnostic::{Diagnostic, Level};
 pub use harness::Harness;
 pub use interruption::Interruption;
 pub use live::{Composition, Running, launch, run, run_composed};
-pub use log::deafness;
+pub use log::{Undecoded, deafness};
 pub use node::{Bytes, Emission, Event, GoalId, GoalStatus, Node, NodeFault};
 pub use setup::Setup;
 pub use tap::{RawPublisher, RawTap};

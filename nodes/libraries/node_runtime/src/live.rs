@@ -236,7 +236,11 @@ impl Running {
     /// When a node ended by a panic or hears no more, and the others have been stopped then; when the end was forced.
     pub fn until(mut self, interruption: &Interruption) -> anyhow::Result<()> {
         let mut ended = None;
+        let mut undecoded = log::Undecoded::default();
         while !interruption.wait(SIGNAL_PERIOD) {
+            if let Some(news) = undecoded.news() {
+                tracing::warn!("{news}");
+            }
             ended = self.ended();
             if ended.is_some() {
                 break;

@@ -34,10 +34,12 @@ use crate::network::Writer;
 mod deaf;
 mod levels;
 mod shown;
+mod undecoded;
 
 pub use deaf::deafness;
 use levels::Levels;
 pub(crate) use levels::Severity;
+pub use undecoded::Undecoded;
 
 /// A node as the speaker of its log lines.
 #[derive(Clone)]
@@ -149,10 +151,7 @@ pub(crate) fn start(arguments: &[&Arguments], environment: &Environment) {
     // Reading CDR it warns of every text that lacks its end, of every message: the node reports what becomes of such a message.
     let quiet =
         format!("rustdds=error,{silent},ros2_client=error,cdr_encoding=error,zenoh=error,{opcua}");
-    // Where DDS is secured it complains of every message of whoever is not.
-    let secured = environment.security.as_ref();
-    let strangers = secured.map_or("", |_| ",rustdds::rtps::message_receiver=off");
-    let default = format!("{level},{quiet}{strangers}");
+    let default = format!("{level},{quiet}");
     let filter = environment
         .log_filter
         .as_deref()
@@ -166,12 +165,15 @@ pub(crate) fn start(arguments: &[&Arguments], environment: &Environment) {
         .with_ansi(std::io::stderr().is_terminal())
         .event_format(Console {
             is_wanted,
+            // Where DDS is secured it complains of every message of whoever is not; what cannot be decrypted is counted.
+            has_strangers: environment.security.is_none() || environment.log_filter.is_some(),
             line: fmt::format().with_target(false),
         });
     // A program that composes nodes may have a subscriber of its own: its lines are its affair then.
     let _ = tracing_subscriber::registry()
         .with(Levels::above(filter))
         .with(deaf::LastWords::of_process())
+        .with(undecoded::Count::of_process())
         .with(console)
         .with(Rosout)
         .try_init();
@@ -181,6 +183,8 @@ pub(crate) fn start(arguments: &[&Arguments], environment: &Environment) {
 struct Console {
     /// Whether any line is wanted there.
     is_wanted: bool,
+    /// Whether the library's lines about strangers' messages are wanted.
+    has_strangers: bool,
     line: Format,
 }
 
@@ -201,6 +205,7 @@ where
             let speakers = speakers();
             speakers.get(&id).is_some_and(|node| !node.is_on_console)
         });
+        let is_silent = is_silent || (!self.has_strangers && undecoded::is_of_strangers(event));
         if !self.is_wanted || is_silent {
             return Ok(());
         }

@@ -65,12 +65,8 @@ impl<S: Subscriber> Layer<S> for LastWords {
         if *event.metadata().level() != Level::ERROR {
             return;
         }
-        let mut line = Line::default();
-        event.record(&mut line);
-        // What comes from the crate `log` names its target in a field.
-        let target = line.target.as_deref();
-        let target = target.unwrap_or_else(|| event.metadata().target());
-        if is_last(target, &line.message) {
+        let line = Line::of(event);
+        if is_last(line.target_of(event), &line.message) {
             let _ = self.kept.set(line.message);
         }
     }
@@ -82,10 +78,31 @@ fn is_last(target: &str, message: &str) -> bool {
     all.any(|(place, begin)| target == place && message.starts_with(begin))
 }
 
+/// What a line of a library says.
 #[derive(Default)]
-struct Line {
+pub(super) struct Line {
     target: Option<String>,
-    message: String,
+    pub message: String,
+}
+
+impl Line {
+    /// That of an event.
+    pub fn of(event: &Event<'_>) -> Self {
+        let mut line = Self::default();
+        event.record(&mut line);
+        line
+    }
+
+    /// What comes from the crate `log` names its target in a field.
+    fn target_of<'a>(&'a self, event: &'a Event<'_>) -> &'a str {
+        let target = self.target.as_deref();
+        target.unwrap_or_else(|| event.metadata().target())
+    }
+
+    /// Whether it is from there.
+    pub fn is_from(&self, event: &Event<'_>, target: &str) -> bool {
+        self.target_of(event) == target
+    }
 }
 
 impl Visit for Line {
