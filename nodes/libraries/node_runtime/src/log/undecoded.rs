@@ -53,26 +53,44 @@ pub(super) fn is_of_strangers(event: &Event<'_>) -> bool {
     Line::of(event).is_from(event, TARGET)
 }
 
-/// Reports messages that cannot be decrypted, once.
+/// Looks without a new message after which the next ones are those of another participant: a minute at 20 ms a look.
+const QUIET_LOOKS: u32 = 3000;
+
+/// Reports messages that cannot be decrypted, once for each time that they come.
 #[derive(Debug, Default)]
 pub struct Undecoded {
     is_reported: bool,
+    /// Messages when they last began to come, and at the last look.
+    before: u64,
+    last: u64,
+    /// Looks since the last message.
+    quiet: u32,
 }
 
 impl Undecoded {
-    /// A sentence for people when enough of them have come, and `None` ever after.
+    /// A sentence for people when enough of them have come; `None` until others come after a pause.
     pub fn news(&mut self) -> Option<String> {
         let n = SO_FAR.load(Ordering::Relaxed);
         self.news_of(n)
     }
 
     fn news_of(&mut self, n: u64) -> Option<String> {
-        if self.is_reported || n < MIN_MESSAGES {
+        self.quiet = if n == self.last { self.quiet + 1 } else { 0 };
+        self.last = n;
+        if self.quiet >= QUIET_LOOKS {
+            *self = Self {
+                before: n,
+                last: n,
+                ..Self::default()
+            };
+        }
+        let came = n - self.before;
+        if self.is_reported || came < MIN_MESSAGES {
             return None;
         }
         self.is_reported = true;
         Some(format!(
-            "{n} messages on the secured graph could not be decrypted. Either the keys that were agreed with a participant do not fit, as in one handshake of 170 with Fast DDS (start the one that is not heard again), or somebody sends forged messages"
+            "{came} messages on the secured graph could not be decrypted. Either the keys that were agreed with a participant do not fit, as in one handshake of 170 with Fast DDS (start the one that is not heard again), or somebody sends forged messages"
         ))
     }
 }
@@ -106,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_person_is_told_once_and_not_of_a_handshake_in_progress() {
+    fn a_person_is_told_once_each_time_and_not_of_a_handshake_in_progress() {
         let mut undecoded = Undecoded::default();
         assert_eq!(undecoded.news_of(MIN_MESSAGES - 1), None);
         let said = undecoded.news_of(137).unwrap();
@@ -114,5 +132,11 @@ mod tests {
             assert!(said.contains(words), "{said}");
         }
         assert_eq!(undecoded.news_of(1000), None);
+        // Others come after a pause.
+        for _ in 0..=QUIET_LOOKS {
+            assert_eq!(undecoded.news_of(1000), None);
+        }
+        let said = undecoded.news_of(1060).unwrap();
+        assert!(said.starts_with("60 messages"), "{said}");
     }
 }
