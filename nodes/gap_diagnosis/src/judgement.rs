@@ -23,6 +23,7 @@ pub mod rule;
 pub(crate) mod unknown;
 pub(crate) mod unresolved;
 pub(crate) mod veto;
+pub(crate) mod with_heat;
 
 use serde::{Deserialize, Serialize};
 

@@ -22,7 +22,7 @@ use crate::judgement::rule::Rule;
 use crate::judgement::unknown::{self, Leftover};
 use crate::judgement::veto::{self, Veto};
 use crate::judgement::{self, Check, CheckId};
-use crate::judgement::{in_course, one_feed, one_plane, other_thermometer, unresolved};
+use crate::judgement::{in_course, one_feed, one_plane, other_thermometer, unresolved, with_heat};
 use crate::noise::Noise;
 use crate::noise::normal::Normal;
 use crate::noise::stack::Stack;
@@ -145,6 +145,7 @@ fn list_look_alikes(scope: &Scope<'_, '_>, signatures: &Library, members: &mut [
     by_clock::list_drift(stack, signatures, members);
     in_course::list(stack, signatures, members, scope.config);
     other_thermometer::list(stack, signatures, members);
+    with_heat::list(stack, signatures, members);
 }
 
 /// Searches the catalogue.

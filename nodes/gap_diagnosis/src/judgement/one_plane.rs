@@ -18,16 +18,15 @@
 //! Nothing but radii in one plane was read.
 
 use metrology::Axis;
-use nalgebra::DVector;
 use twin::Channel;
-use twin::effects::{Kind, Target};
+use twin::effects::Target;
 use twin::simulate::plate_axes;
 
 use crate::judgement::cause::Member;
 use crate::judgement::unresolved;
 use crate::noise::stack::Stack;
 use crate::report::Status;
-use crate::search::signature::Library;
+use crate::search::signature::{Instance, Library};
 
 /// Effects that act along one axis, in the plane as (1).
 const ALONG_AN_AXIS: [&str; 2] = ["scale_error", "servo_lag"];
@@ -50,7 +49,15 @@ pub(crate) fn list(stack: &Stack<'_>, signatures: &Library, members: &mut [Membe
         if member.status() == Status::Surrogate || !ALONG_AN_AXIS.contains(&instance.kind.id) {
             continue;
         }
-        let [own, rival] = [axis, other].map(|axis| plain(stack, instance.kind, axis));
+        let [own, rival] = [axis, other].map(|axis| {
+            let target = Target::Axis(axis);
+            let plain = Instance {
+                target,
+                begins: None,
+                ..instance.clone()
+            };
+            stack.signature(&*plain.at_usual_size())
+        });
         let cos = own.dot(&rival).abs() / (own.norm() * rival.norm()).max(f64::MIN_POSITIVE);
         if cos >= MIN_COSINE {
             unresolved::list(member, instance.kind.id, &other.to_string(), cos);
@@ -74,12 +81,4 @@ fn other_of([u, v]: [Axis; 2], axis: Axis) -> Option<Axis> {
         own if own == v => Some(u),
         _ => None,
     }
-}
-
-/// The signature of an effect in its plain form at its typical size.
-fn plain(stack: &Stack<'_>, kind: &'static Kind, axis: Axis) -> DVector<f64> {
-    let mut values = kind.typical();
-    values.resize(kind.parameters.len() + kind.free.len(), 0.0);
-    values[kind.parameters.len()..].fill(0.0);
-    stack.signature(&*(kind.build)(Target::Axis(axis), &values))
 }

@@ -129,6 +129,14 @@ impl Instance {
         }
     }
 
+    /// The effect in its plain form at its usual size.
+    pub fn at_usual_size(&self) -> Box<dyn Effect> {
+        let mut values = self.kind.typical();
+        values.resize(self.kind.parameters.len() + self.kind.free.len(), 0.0);
+        values[self.kind.parameters.len()..].fill(0.0);
+        self.effect(&values)
+    }
+
     /// The effect with some values.
     pub fn effect(&self, values: &[f64]) -> Box<dyn Effect> {
         let effect = (self.kind.build)(self.target.clone(), values);

@@ -2,6 +2,7 @@
 
 use gap_diagnosis::report::Status;
 use gap_diagnosis::{Course, Diagnosis, Note};
+use metrology::Axis;
 use twin::Session;
 
 use crate::trials::plant::{Circle, Noise, State, Wrong, diagnosed, go_on, names, soft_play, told};
@@ -267,4 +268,58 @@ fn a_name_that_explains_only_a_part_counts_for_less() {
         assert!(causes.all(|cause| cause.confidence < 0.9), "{all}");
     }
     assert!(diagnosis.report.unknown.flagged, "{all}");
+}
+
+/// A machine that works for half an hour before the session goes on: its axes move and nothing is read.
+fn work(session: &mut Session, seconds: f64) {
+    let mut run = session.runs[0].clone();
+    let from_s = session.runs[session.runs.len() - 1].motion.time_s[0] + 60.0;
+    let first_s = run.motion.time_s[0];
+    for time_s in &mut run.motion.time_s {
+        *time_s += from_s + seconds - first_s;
+    }
+    run.readings.clear();
+    session.runs.push(run);
+}
+
+/// A screw that is longer as soon as the machine has worked, by as much in all warm runs, whatever a model of its heat says.
+#[test]
+fn a_scale_that_begins_as_the_machine_warms_is_listed_with_the_screw() {
+    let longer = |s: &State| [60e-6 * s.position[0], 0.0];
+    let listed = |speed_mm_s: f64| {
+        let mut session = cycles(11, &[&nothing]);
+        for seed in 0..4 {
+            work(&mut session, 1800.0);
+            go_on(
+                &mut session,
+                &CYCLE,
+                1,
+                1200 + seed,
+                Noise::default(),
+                &longer,
+            );
+        }
+        let end_s = session
+            .runs
+            .iter()
+            .filter_map(|run| run.motion.time_s.last().copied());
+        let n = (end_s.fold(0.0, f64::max) / 30.0) as usize + 2;
+        let history = &mut session.history;
+        history.step_s = 30.0;
+        for axis in [Axis::X, Axis::Y] {
+            // The cycle itself takes four minutes.
+            let speed = (0..n).map(|at| if at < 8 { 5.0 } else { speed_mm_s });
+            history.speed[axis] = speed.collect();
+            history.speed_squared[axis] = history.speed[axis].iter().map(|v| v * v).collect();
+        }
+        let diagnosis = diagnosed(&session);
+        let mut causes = diagnosis.report.causes.iter();
+        let cause = causes.find(|cause| cause.status != Status::Surrogate);
+        let cause = cause.unwrap_or_else(|| panic!("{}", told(&diagnosis)));
+        let mut alike = cause.confusable_with.iter();
+        let is_screw = |id: &str, axis: &str| (id, axis) == ("screw_elongation", "X");
+        is_screw(&cause.effect, &cause.axis) || alike.any(|own| is_screw(&own.effect, &own.axis))
+    };
+    assert!(listed(120.0), "the machine worked");
+    assert!(!listed(5.0), "the machine stood");
 }
