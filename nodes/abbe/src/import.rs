@@ -22,6 +22,7 @@ mod again;
 mod angles;
 mod axis_names;
 mod bare_touches;
+pub(crate) mod begin;
 mod beside;
 mod book;
 mod clock_parts;
@@ -81,6 +82,7 @@ mod unread;
 mod vocabulary;
 mod writer;
 
+use begin::Before;
 use file::Form;
 use map::{Map, What};
 use runs::Runs;
@@ -157,6 +159,8 @@ pub(crate) struct Imported {
     /// Runs of a measurement that the table lacks or that were broken off, and are not in the bag; targets that an evaluation leaves
     /// out.
     pub n_lost_runs: usize,
+    /// Whether its begin was put behind another table's, for nobody stated it.
+    pub is_put_behind: bool,
     /// What a reader should know: rows and columns that were left out, and what the runs were made of.
     pub notes: Vec<String>,
 }
@@ -173,7 +177,7 @@ impl Import {
         };
         let map = Named::read(map, "map")?;
         let machine = Named::read(machine, "machine file")?;
-        let imported = import(&self.csv, (&map, &[]), machine, output)?;
+        let imported = import(&self.csv, (&map, &[]), machine, (output, None))?;
         tell!(
             "{}: {} runs, {} messages",
             output.display(),
@@ -206,7 +210,7 @@ impl Import {
     }
 }
 
-/// Writes the bag of a table; `assumed`: keys of the map whose values nobody stated.
+/// Writes the bag of a table; `assumed`: keys of the map whose values nobody stated; `before`: what the same call read before.
 ///
 /// # Errors
 /// As [`Import::execute`].
@@ -214,11 +218,13 @@ pub(crate) fn import(
     csv: &Path,
     (named, assumed): (&Named, &[String]),
     machine: Named,
-    output: &Path,
+    (output, before): (&Path, Option<Before>),
 ) -> Result<Imported> {
     let machine_text = machine.text;
     let machine = MachineFile::parse(&machine_text, &machine.place)?;
-    let (map, place) = map_for(named, &machine)?;
+    let (mut map, place) = map_for(named, &machine)?;
+    let assumed = &mut assumed.to_vec();
+    let is_put_behind = put_behind(&mut map, assumed, before);
     let ranges = limits::ranges(&map.test, &machine);
     let in_table = || format!("table {}", csv.display());
     let form = Form {
@@ -270,8 +276,24 @@ pub(crate) fn import(
         n_rows,
         n_odd,
         n_lost_runs: n_lost,
+        is_put_behind,
         notes,
     })
+}
+
+/// Puts a table without a date behind what was read before it; whether that was done.
+fn put_behind(map: &mut Map, assumed: &mut Vec<String>, before: Option<Before>) -> bool {
+    const START: &str = "start_s";
+    let is_assumed = assumed.iter().any(|key| key == START);
+    let begin_s = before.and_then(|before| begin::after(before, map.start_s, is_assumed));
+    let Some(begin_s) = begin_s else {
+        return false;
+    };
+    map.start_s = begin_s;
+    if !is_assumed {
+        assumed.push(START.to_owned());
+    }
+    true
 }
 
 /// Writes the runs of a table; gives their number.

@@ -5,9 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, anyhow, bail};
 use reports::gap::diagnosed::Diagnosed;
 
+use recorder::Bag;
+
 use super::bags;
 use super::no_machine::{Assumed, Shown};
 use crate::import::Named;
+use crate::import::begin::Before;
 use crate::report_bag::foreign_log::{self, Log};
 use crate::report_bag::from_table::{self, FromTable};
 
@@ -16,7 +19,7 @@ pub struct Opened {
     /// Each bag, in the order of the arguments.
     pub bags: Vec<PathBuf>,
     tables: Vec<FromTable>,
-    /// What was assumed of a machine that nobody stated.
+    /// What was assumed of a machine that nobody stated, and of tables without dates.
     assumed: Vec<String>,
 }
 
@@ -27,8 +30,11 @@ impl Opened {
     /// When a map is named without a table, or a table cannot be imported.
     pub fn of(paths: &[PathBuf], map: Option<&Path>, machine: &Named) -> Result<Self> {
         let (mut bags, mut tables) = (vec![], vec![]);
+        let mut put_behind = vec![];
+        let mut last = Last::default();
         for path in paths {
             let Some(source) = Source::of(path)? else {
+                last.add(path, false)?;
                 bags.push(path.clone());
                 continue;
             };
@@ -37,9 +43,13 @@ impl Opened {
                 text: machine.text.clone(),
             };
             let table = match source {
-                Source::Log(log) => from_table::of_log(path, &log, map, Some(machine))?,
-                Source::Table => from_table::of_machine(path, map, machine)?,
+                Source::Log(log) => {
+                    from_table::of_log(path, &log, map, (Some(machine), last.before(map)))?
+                }
+                Source::Table => from_table::of_machine(path, map, (machine, last.before(map)))?,
             };
+            last.add(&table.bag, true)?;
+            put_behind.extend(table.is_put_behind.then(|| path.clone()));
             bags.push(table.bag.clone());
             tables.push(table);
         }
@@ -49,7 +59,7 @@ impl Opened {
         Ok(Self {
             bags,
             tables,
-            assumed: vec![],
+            assumed: apart(&put_behind).into_iter().collect(),
         })
     }
 
@@ -66,16 +76,14 @@ impl Opened {
                     let machine = Named { place, text };
                     return Ok((Self::of(paths, map, &machine)?, machine));
                 }
-                Some(Source::Log(log)) => from_table::of_log(path, &log, map, None)?,
-                Some(Source::Table) => from_table::of_any(path, map)?,
+                Some(Source::Log(log)) => from_table::of_log(path, &log, map, (None, None))?,
+                Some(Source::Table) => from_table::of_any(path, map, None)?,
             };
             shown.add(&table.bag)?;
         }
         let Assumed { machine, lines } = shown.machine();
-        let opened = Self {
-            assumed: lines,
-            ..Self::of(paths, map, &machine)?
-        };
+        let mut opened = Self::of(paths, map, &machine)?;
+        opened.assumed.splice(0..0, lines);
         Ok((opened, machine))
     }
 
@@ -137,6 +145,43 @@ impl Opened {
             }
         }
     }
+}
+
+/// The end of what was read last.
+#[derive(Default)]
+struct Last {
+    end_s: Option<i64>,
+    is_table: bool,
+}
+
+impl Last {
+    fn add(&mut self, bag: &Path, is_table: bool) -> Result<()> {
+        let times = Bag::open(bag)?.log_times_nanos();
+        let end_s = times.and_then(|(_, end)| i64::try_from(end.div_ceil(1_000_000_000)).ok());
+        self.end_s = end_s.or(self.end_s);
+        self.is_table |= is_table;
+        Ok(())
+    }
+
+    fn before(&self, map: Option<&Path>) -> Option<Before> {
+        let has_same_map = self.is_table && map.is_some();
+        self.end_s.map(|end_s| Before {
+            end_s,
+            has_same_map,
+        })
+    }
+}
+
+/// What was assumed of tables without dates.
+fn apart(put_behind: &[PathBuf]) -> Option<String> {
+    let tables = put_behind.iter().map(|path| path.display().to_string());
+    let tables = tables.collect::<Vec<_>>().join(", ");
+    (!tables.is_empty()).then(|| {
+        format!(
+            "warning, begin not stated: {tables}: taken to follow the file before in the order given, a day later or at the next such time \
+             of the day; nothing is judged by the time between these files; write `Date: 2026-01-05 08:00` above the names of the columns"
+        )
+    })
 }
 
 /// What a table is made of.

@@ -118,7 +118,7 @@ const OF_DATES: &[&str] = &[
     "data",
 ];
 /// Dates begin with it, s since 1970: 1990.
-const LEAST_DATE_S: f64 = 631_152_000.0;
+pub const LEAST_DATE_S: f64 = 631_152_000.0;
 /// Feeds, mm/min: others are no feeds.
 const FEEDS_MM_MIN: [f64; 2] = [1.0, 200_000.0];
 /// Radii of circles, mm: others are no radii.

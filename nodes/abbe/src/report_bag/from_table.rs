@@ -6,6 +6,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use metrology::yaml;
 use reports::whole_file::{self, Vanishing};
 
+use crate::import::begin::Before;
 use crate::import::map::{Map, Test};
 use crate::import::plain_machine::PlainMachine;
 use crate::import::{self, Named, propose};
@@ -36,6 +37,8 @@ pub struct FromTable {
     pub n_odd: usize,
     /// Runs that the table lacks or that were broken off, and messages of another program's bag that were left out.
     n_lost_runs: usize,
+    /// Whether its begin was put behind another table's, for nobody stated it.
+    pub is_put_behind: bool,
 }
 
 impl FromTable {
@@ -66,7 +69,7 @@ pub fn is_table(path: &Path) -> bool {
 pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
     if !is_table(path) {
         if let Some(log) = foreign_log::of(path)? {
-            return of_log(path, &log, map, None).map(Some);
+            return of_log(path, &log, map, (None, None)).map(Some);
         }
         if map.is_some() {
             bail!(
@@ -77,16 +80,16 @@ pub fn of(path: &Path, map: Option<&Path>) -> Result<Option<FromTable>> {
         }
         return Ok(None);
     }
-    of_any(path, map).map(Some)
+    of_any(path, map, None).map(Some)
 }
 
-/// Imports a table for a machine that is wide enough for any.
+/// Imports a table for a machine that is wide enough for any; `before`: what the same call read before.
 ///
 /// # Errors
 /// As [`of`].
-pub fn of_any(path: &Path, map: Option<&Path>) -> Result<FromTable> {
+pub fn of_any(path: &Path, map: Option<&Path>, before: Option<Before>) -> Result<FromTable> {
     let (described, read) = described(path, map)?;
-    imported(path, described, stand_in(&read))
+    imported(path, described, (stand_in(&read), before))
 }
 
 /// The machine of a table that states none.
@@ -105,7 +108,7 @@ pub fn of_log(
     path: &Path,
     log: &Log,
     map: Option<&Path>,
-    machine: Option<Named>,
+    (machine, before): (Option<Named>, Option<Before>),
 ) -> Result<FromTable> {
     let home = Vanishing::temporary().context("a folder for the table of the bag")?;
     let name = path.file_name().unwrap_or(path.as_os_str());
@@ -116,7 +119,7 @@ pub fn of_log(
     let told = |text: String| text.replace(&own, &of_bag);
     let made = described(&table, map).and_then(|(described, read)| {
         let machine = machine.unwrap_or_else(|| stand_in(&read));
-        imported(&table, described, machine)
+        imported(&table, described, (machine, before))
     });
     let mut made = made.map_err(|error| anyhow!("{}", told(format!("{error:#}"))))?;
     let lines = std::mem::take(&mut made.lines).into_iter().map(told);
@@ -130,7 +133,11 @@ pub fn of_log(
 ///
 /// # Errors
 /// As [`of`], and where the machine could not have been measured so.
-pub fn of_machine(path: &Path, map: Option<&Path>, machine: Named) -> Result<FromTable> {
+pub fn of_machine(
+    path: &Path,
+    map: Option<&Path>,
+    (machine, before): (Named, Option<Before>),
+) -> Result<FromTable> {
     let (described, read) = described(path, map)?;
     if matches!(read.test, Test::Touches { .. }) {
         bail!(
@@ -139,7 +146,7 @@ pub fn of_machine(path: &Path, map: Option<&Path>, machine: Named) -> Result<Fro
             path.display()
         );
     }
-    imported(path, described, machine)
+    imported(path, described, (machine, before))
 }
 
 /// A map, its keys whose values are assumed, and the lines of what it rests on.
@@ -164,11 +171,11 @@ fn described(path: &Path, map: Option<&Path>) -> Result<(Described, Map)> {
 fn imported(
     path: &Path,
     (named, assumed, mut lines): Described,
-    machine: Named,
+    (machine, before): (Named, Option<Before>),
 ) -> Result<FromTable> {
     let home = Vanishing::temporary().context("a folder for the bag of the table")?;
     let bag = home.path().join("bag");
-    let imported = import::import(path, (&named, &assumed), machine, &bag)?;
+    let imported = import::import(path, (&named, &assumed), machine, (&bag, before))?;
     lines.extend(imported.notes);
     lines.sort_by_key(|line| !line.starts_with(WARNING));
     Ok(FromTable {
@@ -177,6 +184,7 @@ fn imported(
         lines,
         n_odd: imported.n_odd,
         n_lost_runs: imported.n_lost_runs,
+        is_put_behind: imported.is_put_behind,
     })
 }
 

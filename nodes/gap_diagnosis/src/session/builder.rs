@@ -81,6 +81,8 @@ pub struct SessionBuilder {
     base: [u32; 3],
     first_bag_ends: Option<u32>,
     greatest: [u32; 3],
+    /// Whether no sample of the bag came yet.
+    awaits_bag: bool,
     /// Why the first axis state was refused that is of another machine.
     other_machine: Option<SessionError>,
     /// Axis states with numbers, those of another machine included.
@@ -114,6 +116,7 @@ impl SessionBuilder {
             base: [0; 3],
             greatest: [0; 3],
             first_bag_ends: None,
+            awaits_bag: true,
             other_machine: None,
             states: 0,
             has_commands: false,
@@ -136,6 +139,7 @@ impl SessionBuilder {
         self.recent.clear();
         self.touches = NewTouches::default();
         self.base = self.greatest;
+        self.awaits_bag = true;
         if !self.runs.is_empty() {
             let _ = self.first_bag_ends.get_or_insert(self.base[0]);
         }
@@ -238,6 +242,7 @@ impl SessionBuilder {
     }
 
     fn session_time(&mut self, at: Stamp<Host>) -> f64 {
+        let is_first = std::mem::take(&mut self.awaits_bag);
         match self.time.take(at) {
             At::Time(time_s) => {
                 let is_over = |(ended_s, _): &(f64, Record)| time_s - ended_s > LATE_S;
@@ -247,8 +252,11 @@ impl SessionBuilder {
             }
             At::Jumped(time_s) => {
                 self.account.note(Reason::ClockJump);
-                self.cut();
-                self.recent.clear();
+                // What is open before a bag's first sample is the bag's own.
+                if !is_first {
+                    self.cut();
+                    self.recent.clear();
+                }
                 time_s
             }
         }

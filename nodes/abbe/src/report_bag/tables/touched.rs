@@ -259,7 +259,7 @@ fn a_list_has_nothing_to_diagnose() {
         place: "machine.yaml".to_owned(),
         text: std::fs::read_to_string(root("launch_configs/first_run/machine.yaml")).unwrap(),
     };
-    let refused = from_table::of_machine(&root("tests/import/touches.csv"), None, machine);
+    let refused = from_table::of_machine(&root("tests/import/touches.csv"), None, (machine, None));
     let said = refused.err().unwrap().to_string();
     assert!(
         said.contains("touches.csv: a list of touches") && said.contains("abbe report"),
