@@ -133,6 +133,7 @@ impl Diagnose {
         let simulated = self.opened_simulated(&machine_file)?;
         let diagnosed = beside(&opened.bags, &simulated.bags, name, text, &config);
         let mut diagnosed = diagnosed.map_err(|error| opened.named(&error, &self.bags))?;
+        opened.forget_time_between(&mut diagnosed);
         opened.name_as_given(&mut diagnosed, &self.bags);
         simulated.name_simulated(&mut diagnosed, &self.simulated);
         let machine = MachineFile::parse(text, name)?.name;

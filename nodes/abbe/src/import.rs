@@ -31,6 +31,7 @@ mod dates;
 mod deviation_names;
 mod directions;
 mod doubled;
+mod encoding;
 mod file;
 mod formats;
 mod hidden;
@@ -78,6 +79,7 @@ mod touches;
 mod turned;
 mod units;
 mod unlikely;
+mod unnamed;
 mod unread;
 mod vocabulary;
 mod writer;
@@ -231,10 +233,12 @@ pub(crate) fn import(
         separator: map.separator,
         decimal: map.decimal,
         sheet: map.sheet.as_deref(),
+        is_by_number: unnamed::is_by_number(&map),
     };
     let columns = map.test.columns();
     let is_table = |sheet: &sheet::Sheet| columns.iter().all(|column| sheet.has(column.name));
-    let cells = file::read(csv, form, &is_table).with_context(in_table)?;
+    let mut cells = file::read(csv, form, &is_table).with_context(in_table)?;
+    let unnamed = unnamed::give_names(&mut cells.sheet, &map);
     let table = Table::of(&cells.sheet, &map, &ranges).with_context(in_table)?;
     angles::check(&map, &table).with_context(in_table)?;
     let mut runs = runs::of(&map.test, &table).with_context(in_table)?;
@@ -260,6 +264,7 @@ pub(crate) fn import(
     notes.extend(written.in_words());
     let form = cells.form.map(str::to_owned);
     notes.extend(form.into_iter().chain(cells.note).chain(cells.remarks));
+    notes.extend(unnamed);
     notes.extend(cells.sheet.turned);
     notes.extend(table.left_out);
     let one_sided = one_sided(&map, &runs);

@@ -32,6 +32,7 @@ use crate::pdf;
 use crate::tell::tell;
 
 mod first_screen;
+pub mod folder;
 pub mod foreign_log;
 pub mod from_table;
 
@@ -101,6 +102,7 @@ impl ReportBag {
         let budget = self.budget.as_deref().map(Budget::open).transpose()?;
         let limits = self.limits.as_deref().map(alarms::read).transpose()?;
         complain!("Evaluating the tests of {}", self.bag.display());
+        folder::check(&self.bag, "report")?;
         let table = from_table::of(&self.bag, self.map.as_deref())?;
         let bag = Bag::open(table.as_ref().map_or(&self.bag, |table| &table.bag))?;
         machines::check(bag.topics()).with_context(|| self.bag.display().to_string())?;

@@ -11,6 +11,7 @@ use super::bags;
 use super::no_machine::{Assumed, Shown};
 use crate::import::Named;
 use crate::import::begin::Before;
+use crate::report_bag::folder;
 use crate::report_bag::foreign_log::{self, Log};
 use crate::report_bag::from_table::{self, FromTable};
 
@@ -97,6 +98,14 @@ impl Opened {
     pub fn warnings(&self) -> Vec<String> {
         let of_tables = self.tables.iter().flat_map(FromTable::warnings);
         self.assumed.iter().cloned().chain(of_tables).collect()
+    }
+
+    /// Takes from a diagnosis what rests on the time between files, where nobody stated it.
+    pub fn forget_time_between(&self, diagnosed: &mut Diagnosed) {
+        if self.tables.iter().any(|table| table.is_put_behind) {
+            let unknown = &mut diagnosed.diagnosis.report.unknown;
+            unknown.description.time_constant_s = None;
+        }
     }
 
     /// Whether any of them is a table.
@@ -197,6 +206,7 @@ impl Source {
         if from_table::is_table(path) {
             return Ok(Some(Self::Table));
         }
+        folder::check(path, "diagnose")?;
         Ok(foreign_log::of(path)?.map(Self::Log))
     }
 }

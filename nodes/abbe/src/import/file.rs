@@ -5,10 +5,11 @@ use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail};
 use calamine::{DataRef, ExcelDateTime, Reader, SheetVisible, Xlsx};
-use node_runtime::text_file::{self, Comments};
+use node_runtime::text_file;
 
 use super::book;
 use super::dates;
+use super::encoding;
 use super::instrument;
 use super::sheet::{Cells, MOST_CELLS, MOST_COLUMNS, Sheet};
 use super::turned;
@@ -31,6 +32,8 @@ pub struct Form<'m> {
     pub decimal: char,
     /// Worksheet, where there are several.
     pub sheet: Option<&'m str>,
+    /// Whether the columns are named by their numbers, which are those of the file.
+    pub is_by_number: bool,
 }
 
 /// Whether the cells of a file are apart by separators, and neither a worksheet nor of an instrument's own form.
@@ -60,13 +63,15 @@ pub fn read(path: &Path, form: Form<'_>, is_table: &dyn Fn(&Sheet) -> bool) -> R
         bail!("sheet = {name}: does nothing, the file is a text: remove it");
     }
     // Numbers apart by blanks under such a map are samples of a sampler.
-    let is_sampled = form.separator == ' ';
+    let is_sampled = form.separator == ' ' || form.is_by_number;
     if let Some(instrument) = instrument::of(&bytes).filter(|_| !is_sampled) {
         return instrument.cells(&bytes, form.decimal);
     }
-    let sheet = Sheet::of_text(&text_file::read(path, Comments::Csv)?, form.separator)?;
+    let decoded = encoding::read(path)?;
+    let sheet = Sheet::of_text(&decoded.text, form.separator)?;
     Ok(Cells {
         sheet: turned::applied(sheet, form.decimal)?,
+        remarks: decoded.note.into_iter().collect(),
         ..Cells::default()
     })
 }
@@ -290,6 +295,7 @@ mod tests {
             separator: ',',
             decimal,
             sheet: None,
+            is_by_number: false,
         }
     }
 

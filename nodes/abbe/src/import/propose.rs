@@ -53,6 +53,7 @@ pub fn of(path: &Path) -> Result<Proposal> {
             found.n_rows
         )];
     }
+    text.recognised.extend(looked.encoding);
     if let Some(name) = looked.sheet {
         let _ = writeln!(text.head, "sheet: {}", quoted(&name));
         text.recognised.push(format!("sheet: \"{name}\""));

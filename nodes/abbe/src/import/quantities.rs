@@ -56,6 +56,25 @@ const READING_WORDS_OF_RUNS: [&str; 5] = [
     "messdurchgang",
     "messzyklus",
 ];
+/// Words of a reading, and those beside them that make a number of one: of whole numbers that count, they number runs.
+const READING_WORDS: [&str; 13] = [
+    "messung",
+    "mess",
+    "measurement",
+    "measure",
+    "mesure",
+    "mesurage",
+    "misura",
+    "misurazione",
+    "medición",
+    "medicion",
+    "medida",
+    "medição",
+    "pomiar",
+];
+const OF_NUMBERS: [&str; 9] = [
+    "nr", "no", "n", "num", "nummer", "number", "numéro", "numero", "id",
+];
 /// First letters of words for statistics, limits, other errors and computed values. A column with such a word has no readings.
 const OF_NO_READING: &[&str] = &[
     "limit",
@@ -142,12 +161,33 @@ pub fn is_no_reading(words: &[String]) -> bool {
     })
 }
 
-/// What a column of numbers holds by the words of its name; one of a length without others holds a displacement.
-pub fn of(words: &[String], is_length: bool) -> Option<Role> {
-    if words
+/// Whether a column numbers its readings (`Messung`, `Measurement no.`): its name says no more, and its cells count from 0 or 1
+/// up, each number for one row or several.
+fn numbers_readings(words: &[String], cells: &[&str]) -> bool {
+    let is_among = |all: &[&str]| words.iter().any(|word| all.contains(&word.as_str()));
+    let is_bare = |word: &String| {
+        READING_WORDS.contains(&word.as_str()) || OF_NUMBERS.contains(&word.as_str())
+    };
+    let numbers: Option<Vec<u32>> = cells.iter().map(|cell| cell.parse().ok()).collect();
+    let numbers = numbers.unwrap_or_default();
+    let Some(least) = numbers.iter().min() else {
+        return false;
+    };
+    let counts = |two: &[u32]| two[1] == two[0] || two[1] == two[0] + 1 || two[1] == *least;
+    let has_rows = numbers.windows(2).any(|two| two[1] != two[0] + 1);
+    is_among(&READING_WORDS)
+        && words.iter().all(is_bare)
+        && *least <= 1
+        && has_rows
+        && numbers.windows(2).all(counts)
+}
+
+/// What a column of numbers holds by the words of its name and its cells; one of a length without others holds a displacement.
+pub fn of(words: &[String], is_length: bool, cells: &[&str]) -> Option<Role> {
+    let is_of_runs = words
         .iter()
-        .any(|word| READING_WORDS_OF_RUNS.contains(&word.as_str()))
-    {
+        .any(|word| READING_WORDS_OF_RUNS.contains(&word.as_str()));
+    if is_of_runs || !is_length && numbers_readings(words, cells) {
         return Some(Role::Run);
     }
     let mut roles = ROLE_WORDS.iter().map(|(role, ..)| *role);

@@ -415,7 +415,7 @@ fn role(
         return Some(Role::Pass(pass.direction));
     }
     // One of a side is no quantity of both.
-    let role = quantities::of(words, kind == Some(Kind::Length))?;
+    let role = quantities::of(words, kind == Some(Kind::Length), cells)?;
     let is_of_both = matches!(role, Role::Temperature | Role::Time | Role::Run);
     (is_of_both || !pass_names::has_direction(name)).then_some(role)
 }

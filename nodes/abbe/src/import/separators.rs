@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use node_runtime::text_file::{self, Comments};
+
+use super::encoding;
 
 /// Lines from the first on that are looked at for what parts their columns.
 const FIRST_LINES: usize = 100;
@@ -56,14 +57,15 @@ pub(super) fn place_of(name: &str, head: &[String], separator: Option<char>) -> 
 }
 
 /// The place of `column 2` in a table whose columns have other names, or names that were given to them.
-fn by_number(name: &str, n_columns: usize) -> Option<usize> {
+pub(super) fn by_number(name: &str, n_columns: usize) -> Option<usize> {
     let number: usize = name.strip_prefix("column ")?.parse().ok()?;
     number.checked_sub(1).filter(|place| *place < n_columns)
 }
 
 /// That no names of columns were found; a separator that is not read is named as the reason.
 pub(super) fn no_names(path: &Path) -> String {
-    let text = text_file::read(path, Comments::Csv).ok();
+    let read = encoding::read(path).ok();
+    let text = read.map(|read| read.text);
     let remedy = match text.as_deref().and_then(foreign) {
         Some(by) => format!(
             "its columns seem to be apart by {by}, and no line has a name for each of them: put commas, semicolons or tabs between the cells"

@@ -176,7 +176,9 @@ fn imported(
     let home = Vanishing::temporary().context("a folder for the bag of the table")?;
     let bag = home.path().join("bag");
     let imported = import::import(path, (&named, &assumed), machine, (&bag, before))?;
-    lines.extend(imported.notes);
+    let is_new = |note: &String| !lines.contains(note);
+    let notes: Vec<String> = imported.notes.into_iter().filter(is_new).collect();
+    lines.extend(notes);
     lines.sort_by_key(|line| !line.starts_with(WARNING));
     Ok(FromTable {
         _home: home,

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::Result;
-use node_runtime::text_file::{self, Comments};
 
+use super::super::encoding;
 use super::super::file::{self, Form};
 use super::super::recognise::{self, Recognised};
 use super::super::sheet::Sheet;
@@ -17,6 +17,8 @@ pub struct Looked {
     pub found: Option<Recognised>,
     /// Name of the worksheet, where there are several.
     pub sheet: Option<String>,
+    /// The encoding of a text that is not UTF-8.
+    pub encoding: Option<String>,
     /// The instrument's own form.
     pub form: Option<&'static str>,
     /// When the measurement began, s since 1970, where the file says so.
@@ -32,11 +34,14 @@ pub fn at(path: &Path) -> Result<Looked> {
         separator: ',',
         decimal: '.',
         sheet: None,
+        is_by_number: false,
     };
     if file::is_separated(path)? {
-        let found = recognise::of_text(&text_file::read(path, Comments::Csv)?)?;
+        let decoded = encoding::read(path)?;
+        let found = recognise::of_text(&decoded.text)?;
         return Ok(Looked {
             found,
+            encoding: decoded.note,
             ..Looked::default()
         });
     }
@@ -50,5 +55,6 @@ pub fn at(path: &Path) -> Result<Looked> {
         sheet: cells.name,
         form: cells.form,
         start_s: cells.start_s,
+        ..Looked::default()
     })
 }

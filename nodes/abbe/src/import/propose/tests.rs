@@ -308,11 +308,35 @@ fn thermometers_of_one_word_and_those_without_a_unit_are_all_read() {
 
 #[test]
 fn a_series_of_readings_numbers_runs() {
-    let text = "Messreihe;Richtung;Sollwert mm;Messwert um\n1;auf;0;0,5\n1;auf;50;1,5\n";
-    let (proposal, _) = proposed("a.csv", &text.replace("auf", "up"));
-    assert!(
-        proposal.map.contains("run: \"Messreihe\""),
-        "{}",
-        proposal.map
-    );
+    let rows = "1;auf;0;0,5\n1;auf;50;1,5\n1;ab;50;-1,5\n1;ab;0;-2\n2;auf;0;0,4\n2;auf;50;1,4\n";
+    for name in [
+        "Messreihe",
+        "Messung",
+        "Messung Nr.",
+        "Mess-Nr",
+        "Measurement",
+        "mesure",
+        "Misura n.",
+    ] {
+        let text = format!("{name};Richtung;Sollwert mm;Messwert um\n{rows}");
+        let map = proposed("a.csv", &text).0.map;
+        for words in [
+            format!("run: \"{name}\""),
+            "direction: \"Richtung\"".to_owned(),
+            "measured_mm: \"Messwert um\"".to_owned(),
+        ] {
+            assert!(map.contains(&words), "{words}: {map}");
+        }
+    }
+    // Readings stay readings: they do not count, or have a unit or other words.
+    for (name, cells) in [
+        ("Messung", ["0,5", "50,1", "100,2"]),
+        ("Messung mm", ["0", "1", "1"]),
+        ("Messung", ["0", "50", "100"]),
+    ] {
+        let [a, b, c] = cells;
+        let text = format!("Soll mm;{name}\n0;{a}\n50;{b}\n100;{c}\n");
+        let map = proposed("a.csv", &text).0.map;
+        assert!(map.contains(&format!("measured_mm: \"{name}\"")), "{map}");
+    }
 }

@@ -44,6 +44,14 @@ fn words_of_directions_in_four_languages_are_read() {
         ("direction", ["f", "r"]),
         ("direction", ["-->", "<--"]),
         ("direction", ["positive direction", "negative direction"]),
+        ("Richtung", ["auf", "ab"]),
+        ("Richtung", ["steigend", "fallend"]),
+        ("Richtung", ["aufwärts", "abwärts"]),
+        ("Anfahrt", ["Auf 1", "Ab 1"]),
+        ("direction", ["ascending", "descending"]),
+        ("sens", ["montée", "descente"]),
+        ("senso", ["salita", "discesa"]),
+        ("sentido", ["subida", "bajada"]),
     ] {
         for has_runs in [true, false] {
             let map = proposed(name, words, has_runs).expect(name);
@@ -64,7 +72,7 @@ fn a_column_of_directions_with_other_words_is_refused_with_those_that_are_known(
         for has_runs in [true, false] {
             let said = proposed(name, words, has_runs).expect_err(name);
             assert!(said.contains(&format!("column \"{name}\"")), "{said}");
-            assert!(said.contains("hin, aller"), "{said}");
+            assert!(said.contains("hin, auf, aller"), "{said}");
         }
     }
 }
