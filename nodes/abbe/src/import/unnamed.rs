@@ -79,18 +79,16 @@ mod tests {
     fn the_first_line_is_a_row_where_it_holds_values_and_the_map_gives_numbers() {
         let stops = "positioning: {axis: X, feed_mm_min: 1000.0, dwell_s: 2.0, overrun_mm: 1.0, run: column 1, direction: column 2, target_mm: column 3, deviation_um: column 4}";
         let log = "log: {axis: Z, time_s: column 1, displacement_um: column 2}";
-        for (keys, first) in [
-            (stops, "1,up,0,0.5"),
-            (stops, "1,-1,0,0.5"),
-            (stops, "1,auf,0,"),
-            (stops, "1,up,0,0.5,Otto"),
-            (log, "0,0.5"),
-            (log, "2026-01-05 08:00:00,0.5"),
-            (log, "08:00:00,NaN"),
+        for (keys, first, next) in [
+            (stops, "1,up,0,0.5", "1,up,50,0.7"),
+            (stops, "1,-1,0,0.5", "1,-1,50,0.7"),
+            (stops, "1,auf,0,", "1,auf,50,0.7"),
+            (stops, "1,up,0,0.5,Otto", "1,up,50,0.7,Otto"),
+            (log, "0,0.5", "30,0.7"),
+            (log, "2026-01-05 08:00:00,0.5", "2026-01-05 08:00:30,0.7"),
+            (log, "08:00:00,NaN", "08:00:30,0.7"),
         ] {
-            let rest = first.replace("0,0.5", "50,0.7").replace(":00,", ":30,");
-            let rest = rest.replace("NaN", "0.7").replace("auf,0,", "auf,50,0.7");
-            let (lines, said) = read(&format!("# a comment\n{first}\n{rest}\n"), &map(keys));
+            let (lines, said) = read(&format!("# a comment\n{first}\n{next}\n"), &map(keys));
             assert_eq!(lines, [2, 3], "{first}");
             assert!(said.expect(first).starts_with("line 2: has values"));
         }

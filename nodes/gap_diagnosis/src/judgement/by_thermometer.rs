@@ -3,17 +3,22 @@
 //! A log that goes with thermometers on runs left out (`thermal`) says which body moves the tip. An effect of another body, and an
 //! event whose time nobody recorded, can follow the same curve for a while; neither is named then. Of the others a shift with the
 //! temperature of that body is tried (`thermal_shift`): the spindle's are its own growth.
+//!
+//! A growth by time alone, or an event, fits a warm-up as well as the body does, and would stand in its place without being named.
+//! Where nothing that follows a thermometer is named beside it, the search is made again without it. Both are listed as one set then.
 
 use std::collections::BTreeSet;
 
 use machine::file::SensorPlace;
 use metrology::Axis;
+use nalgebra::DVector;
 use twin::effects::{self, Target};
 
-use crate::judgement::cause::{Member, Scope};
-use crate::judgement::{Check, CheckId};
+use crate::judgement::cause::{Found, Member, Scope};
+use crate::judgement::{Check, CheckId, unresolved};
 use crate::noise::stack::Stack;
 use crate::noise::unrepeated;
+use crate::report::Status;
 use crate::report::figures::Note;
 use crate::search::rows::count;
 use crate::search::signature::{Instance, Library};
@@ -32,6 +37,9 @@ const DRIVEN: [(&str, &[SensorPlace]); 2] = [
 ];
 /// Effects that begin at an instant of their own.
 const EVENTS: [&str; 2] = ["coolant", "homing_shift"];
+
+/// Cosine from which an effect that no thermometer drives is listed with the one that was found in its place.
+const MIN_COSINE_HIDDEN: f64 = 0.9;
 
 /// The effect of one thermometer.
 pub(crate) const SHIFT: &str = "thermal_shift";
@@ -93,6 +101,62 @@ pub(crate) fn is_of_another(stack: &Stack<'_>, instance: &Instance, thermometers
     let own = drivers_of(stack, instance.kind.id, &instance.target);
     let is_driven = DRIVEN.iter().any(|(driven, _)| *driven == instance.kind.id);
     is_driven && !own.is_empty() && own.iter().all(|id| !found.contains(id.as_str()))
+}
+
+/// Whether a log goes with thermometers of which none drives an effect: it would not be named.
+pub(crate) fn is_driven_by_none(
+    stack: &Stack<'_>,
+    instance: &Instance,
+    thermometers: &[Note],
+) -> bool {
+    drivers(stack, instance, thermometers) == Some(0)
+}
+
+/// An effect and its signature with the values that were found.
+pub(crate) type Hiding = (&'static str, String, DVector<f64>);
+
+/// The members that are not named since no thermometer that the log goes with drives them, where what follows one is not named
+/// either: they may stand in its place.
+pub(crate) fn hiding(stack: &Stack<'_>, found: &Found) -> Vec<Hiding> {
+    if !log::is_of_logs(stack) || found.named().any(|member| follows(found, member)) {
+        return vec![];
+    }
+    let hides =
+        |member: &&Member| is_driven_by_none(stack, found.instance(member), &found.thermometers);
+    let all = found.members.iter().filter(hides).map(|member| {
+        let own = found.instance(member);
+        let shown = stack.signature(&*own.effect(&member.estimate.values));
+        (own.kind.id, own.target.to_string(), shown)
+    });
+    all.collect()
+}
+
+/// Lists what a search did without with the named members that follow thermometers in its place, where both show the same; whether
+/// there are such members.
+pub(crate) fn list_hiding(stack: &Stack<'_>, found: &mut Found, hiding: &[Hiding]) -> bool {
+    let is_one = |member: &Member| member.status() != Status::Surrogate && follows(found, member);
+    let places: Vec<usize> = { found.members.iter().enumerate() }
+        .filter(|(_, member)| is_one(member))
+        .map(|(place, _)| place)
+        .collect();
+    for place in &places {
+        let values = &found.members[*place].estimate.values;
+        let own = found.instance(&found.members[*place]).effect(values);
+        let own = stack.signature(&*own);
+        for (effect, target, shown) in hiding {
+            let cos = own.dot(shown).abs() / (own.norm() * shown.norm()).max(f64::MIN_POSITIVE);
+            if cos >= MIN_COSINE_HIDDEN {
+                unresolved::list(&mut found.members[*place], effect, target, cos);
+            }
+        }
+    }
+    !places.is_empty()
+}
+
+/// Whether a member follows a thermometer.
+fn follows(found: &Found, member: &Member) -> bool {
+    let id = found.instance(member).kind.id;
+    id == SHIFT || DRIVEN.iter().any(|(driven, _)| *driven == id)
 }
 
 /// The thermometers that were read and that an effect follows, both of a pair.

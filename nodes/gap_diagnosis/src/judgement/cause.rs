@@ -157,6 +157,20 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let thermometers = thermal::notes(stack);
     instances.retain(|own| !by_thermometer::is_of_another(stack, own, &thermometers));
     instances.extend(by_thermometer::shifts(scope, &thermometers));
+    let found = found_among(scope, instances.clone(), &thermometers);
+    let hiding = by_thermometer::hiding(stack, &found);
+    if hiding.is_empty() {
+        return found;
+    }
+    instances.retain(|own| !by_thermometer::is_driven_by_none(stack, own, &thermometers));
+    let mut instead = found_among(scope, instances, &thermometers);
+    let is_named = by_thermometer::list_hiding(stack, &mut instead, &hiding);
+    if is_named { instead } else { found }
+}
+
+/// Searches some instances.
+fn found_among(scope: &Scope<'_, '_>, instances: Vec<Instance>, thermometers: &[Note]) -> Found {
+    let stack = scope.stack;
     let mut signatures = Library::new(stack, instances);
     lines::add(stack, scope.slots, &mut signatures);
     widening::widen_curves(stack, &mut signatures);
@@ -180,7 +194,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     }
     let forms = isolability::forms(&signatures, &normal, &best.set);
     let mut members = veto::judged(scope, &signatures, &normal, &best, &forms, is_closed);
-    by_thermometer::check(scope, &signatures, &mut members, &thermometers);
+    by_thermometer::check(scope, &signatures, &mut members, thermometers);
     list_look_alikes(scope, &signatures, &mut members);
     resize(stack, &signatures, &normal, &mut members);
     while leave_out_small(stack, &signatures, &mut members) {
@@ -204,7 +218,7 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
         forms,
         set: best.set,
         freedom: stack.freedom(),
-        thermometers,
+        thermometers: thermometers.to_vec(),
     }
 }
 

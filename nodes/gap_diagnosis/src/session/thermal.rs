@@ -27,7 +27,8 @@
 //! This finds what goes with what. Whether it is a cause, and which, is for the effects of the catalogue to show.
 //!
 //! # Holds when
-//! Runs are under one zero: that of most of them is looked at. Of one or two runs, thirds of each are left out in turn. Neighbouring runs of one log share slow noise, so
+//! Runs are under one zero: that of most of them is looked at. Of one or two runs, thirds of each are left out in turn, of short ones
+//! thirds of all rows. Neighbouring runs of one log share slow noise, so
 //! that (3) is rather too good than too bad.
 //!
 //! # References

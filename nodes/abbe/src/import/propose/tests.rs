@@ -323,7 +323,7 @@ fn a_series_of_readings_numbers_runs() {
         for words in [
             format!("run: \"{name}\""),
             "direction: \"Richtung\"".to_owned(),
-            "measured_mm: \"Messwert um\"".to_owned(),
+            "deviation_um: \"Messwert um\"".to_owned(),
         ] {
             assert!(map.contains(&words), "{words}: {map}");
         }

@@ -9,8 +9,8 @@ use crate::search::rows::count;
 
 /// Runs from which on each is left out as a whole, and parts of each of fewer runs.
 const FEWEST_FOLDS: usize = 3;
-/// Fewest rows of such a part.
-const ROWS_OF_A_PART: usize = 15;
+/// Fewest rows of such a part: a third of what is left of the shortest log of which a third is held out, 60 rows.
+const ROWS_OF_A_PART: usize = 13;
 
 /// Sums of squares and products of one run.
 pub(super) struct Fold {
@@ -34,18 +34,22 @@ impl Sums {
     }
 }
 
-/// Runs that are left out in turn: as they are from [`FEWEST_FOLDS`] on, of fewer the parts of each; `None` of too few rows.
+/// Runs that are left out in turn: as they are from [`FEWEST_FOLDS`] on, of fewer the parts of each, and of too short ones those of
+/// all together; `None` of too few rows.
 pub(super) fn in_parts(runs: Vec<Vec<[f64; 2]>>) -> Option<Vec<Vec<[f64; 2]>>> {
     if runs.len() >= FEWEST_FOLDS {
         return Some(runs);
     }
+    let is_short = |rows: &Vec<[f64; 2]>| rows.len() < FEWEST_FOLDS * ROWS_OF_A_PART;
+    let runs = match runs.iter().any(is_short) {
+        true => vec![runs.concat()],
+        false => runs,
+    };
     let parts = |rows: &Vec<[f64; 2]>| -> Vec<Vec<[f64; 2]>> {
         let size = rows.len().div_ceil(FEWEST_FOLDS).max(1);
         rows.chunks(size).map(<[_]>::to_vec).collect()
     };
-    let is_long = runs
-        .iter()
-        .all(|rows| rows.len() >= FEWEST_FOLDS * ROWS_OF_A_PART);
+    let is_long = !runs.iter().any(is_short);
     is_long.then(|| runs.iter().flat_map(parts).collect())
 }
 
