@@ -25,15 +25,16 @@
 //!   D^2 = sum over touches of  v1/v0 - 1 - ln(v1/v0),   v1 = v0 + (f s)^2                 (1)
 //! ```
 
+mod places;
+
 use std::fmt::Write as _;
 
 use fake_cnc::PlantFile;
 use fake_cnc::config::FeedbackSource;
 use fake_cnc::plant::{Place, SquarenessEntry};
 use machine::MachineFile;
-use machine::file::{ArtefactEntry, AxisEntry, PositionFeedback, SensorEntry, SensorPlace};
+use machine::file::{AxisEntry, PositionFeedback, SensorEntry, SensorPlace};
 use metrology::Axis;
-use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 use sequencer::{Plan, Step};
 
@@ -41,6 +42,8 @@ use crate::effect::{Class, Hidden};
 use crate::error::TrialError;
 use crate::rig::Rig;
 use crate::size::touch_mm2;
+
+use places::Places;
 
 const FIVE_AXIS: [&str; 2] = [
     include_str!("../../../../launch_configs/five_axis/machine.yaml"),
@@ -133,24 +136,8 @@ fn in_both_files(rig: &mut Rig, change: impl Fn(&mut MachineFile)) {
 
 /// A ring gauge and a sphere somewhere on the table; one of them is touched, and faces at three feeds.
 fn touched(random: &mut Pcg64Mcg, rig: &mut Rig, id: &str, points: u32) -> Result<(), TrialError> {
-    let mut near = |middle: f64| (middle + random.random_range(-20.0..20.0_f64)).round();
-    let (ring_mm, ball_mm) = (
-        [near(0.0), near(0.0), 60.0],
-        [near(100.0), near(60.0), 60.0],
-    );
-    let radius_mm = near(50.0);
-    in_both_files(rig, |file| {
-        file.artefacts.push(ArtefactEntry::Bore {
-            id: "ring".to_owned(),
-            centre_mm: ring_mm,
-            radius_mm,
-        });
-        file.artefacts.push(ArtefactEntry::Sphere {
-            id: "ball".to_owned(),
-            centre_mm: ball_mm,
-            radius_mm: 12.5,
-        });
-    });
+    let places = Places::draw(random, rig);
+    in_both_files(rig, |file| file.artefacts.extend(places.artefacts()));
     rig.plant.touch_probe.spring_force_n = NO_SPRING_N;
     let is_kept = |step: &Step| matches!(step, Step::Latency { .. });
     rig.plan.steps.retain(is_kept);

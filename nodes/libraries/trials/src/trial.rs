@@ -290,6 +290,7 @@ pub(crate) fn deviations(rig: &Rig) -> Result<(Deviations, f64), TrialError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement::Sample;
 
     #[test]
     fn numbers_of_effects_have_their_shares_and_d_its_range() {
@@ -344,5 +345,29 @@ mod tests {
         for (index, class) in (0..).zip(Class::ALL) {
             assert_eq!(wanted(&mut random, Arm::LeftOut, index)[0].0.class, class);
         }
+    }
+
+    /// The machine before its programme, and what it was to hide.
+    fn own_machine(seed: u64, index: u64) -> Rig {
+        let mut random = stream(Arm::Own, seed, index);
+        let mut rig = Rig::draw(&mut random, false).unwrap();
+        let (hidden, _) = wanted(&mut random, Arm::Own, index)[0];
+        own::prepare(&mut random, &hidden, &mut rig).unwrap();
+        rig
+    }
+
+    /// In the series of this seed the ring of this machine stood where the stylus had to go down beside the sphere.
+    #[test]
+    fn a_sphere_near_a_ring_is_touched_to_the_end() {
+        let mut rig = own_machine(12_609_568_478_819_048_098, 87);
+        let is_sphere = |step: &Step| matches!(step, Step::Artefact { id, .. } if id == "ball");
+        rig.plan.steps.retain(is_sphere);
+        rig.plan.steps.truncate(1);
+        let mut touches = 0;
+        let counted = measure(&rig, &mut |_, sample| {
+            touches += usize::from(matches!(sample, Sample::Trigger(_)));
+        });
+        assert!(counted.is_ok(), "{counted:?}");
+        assert_eq!(touches, 25);
     }
 }
