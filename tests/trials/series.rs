@@ -187,6 +187,29 @@ fn a_rule_that_is_switched_off_is_judged_on_the_same_trials() {
     assert_eq!(table["trials"], 1);
 }
 
+/// A line as the series writes it where the program of a drawn machine ends early.
+#[test]
+fn a_machine_that_could_not_be_measured_is_counted_and_not_drawn_again() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    let line = r#"{"arm":"null","index":0,"seed":80,"commit":"c","not_measured":"run 1 failed: line 54: probe closed"}"#;
+    std::fs::write(out.join("journal.jsonl"), format!("{line}\n")).unwrap();
+    let arguments = ["--arm", "iv", "--seed", "80", "--in-process", "--n", "2"];
+    let (table, said) = run(folder.path(), &arguments);
+    let both = journal(folder.path());
+    assert_eq!(both.len(), 2);
+    assert_eq!(both[1]["truth"]["index"], 1);
+    assert_eq!(table["trials"], 1);
+    assert_eq!(table["not_measured"][0]["index"], 0);
+    for wanted in [
+        "1 of 2 drawn machines could not be measured and are in no rate.",
+        "iv 0: could not be measured: run 1 failed: line 54: probe closed",
+    ] {
+        assert!(said.contains(wanted), "{said}");
+    }
+}
+
 #[test]
 fn an_arm_that_is_none_is_refused_with_those_that_are() {
     let mut command = trials(&["--arm", "viii"]);

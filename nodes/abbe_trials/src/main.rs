@@ -41,7 +41,7 @@ mod table;
 mod tree;
 mod trial;
 
-use journal::Journal;
+use journal::{Journal, NotMeasured};
 use programmes::Programmes;
 use series::Series;
 use trial::How;
@@ -202,10 +202,15 @@ impl Trials {
             truth.seed == seed && truth.index < self.n && arms.contains(&truth.arm)
         };
         let verdicts: Vec<Verdict> = journal.verdicts().iter().filter(own).cloned().collect();
+        let is_own =
+            |it: &&NotMeasured| it.seed == seed && it.index < self.n && arms.contains(&it.arm);
+        let machines = journal.not_measured().iter().filter(is_own);
+        let not_measured: Vec<NotMeasured> = machines.cloned().collect();
         if is_of_a_shop {
             self.publish(&shop::Table::of(&arms, seed, &verdicts).contents()?)?;
         } else {
-            let table = table::Table::of(&arms, seed, &verdicts, self.in_process, ratio);
+            let table = table::Table::of(&arms, seed, &verdicts, self.in_process, ratio)
+                .without(not_measured);
             let [terminal, json] = [table.terminal()?, table.json()?];
             self.publish(&[terminal, json, table.html()?, table.markdown()?])?;
         }

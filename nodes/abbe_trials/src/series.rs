@@ -5,14 +5,20 @@ use node_runtime::complain;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use gap_diagnosis::Rule;
 use indicatif::{ProgressBar, ProgressStyle};
 use trials::{Arm, Verdict};
 
-use crate::journal::Journal;
+use crate::journal::{Journal, NotMeasured};
 use crate::shop;
 use crate::trial::{How, Which};
+
+/// What came of a trial.
+enum Made {
+    Judged(Vec<Verdict>),
+    NotMeasured(NotMeasured),
+}
 
 /// A series.
 pub struct Series<'a> {
@@ -53,21 +59,25 @@ impl Series<'_> {
                             index: *index,
                             rules,
                         };
-                        let verdicts = self
-                            .how
-                            .trial(&which, &|line| tell(bar, line))
-                            .with_context(|| format!("trial {arm} {index}, seed {}", self.seed));
-                        if said.send(verdicts).is_err() {
+                        if said.send(self.made(&which, bar)).is_err() {
                             return;
                         }
                     }
                 });
             }
             drop(said);
-            for verdicts in &heard {
-                for verdict in verdicts? {
-                    tell(&bar, &sentence(&verdict));
-                    journal.add(verdict)?;
+            for made in &heard {
+                match made? {
+                    Made::Judged(verdicts) => {
+                        for verdict in verdicts {
+                            tell(&bar, &sentence(&verdict));
+                            journal.add(verdict)?;
+                        }
+                    }
+                    Made::NotMeasured(machine) => {
+                        tell(&bar, &machine.to_string());
+                        journal.add_not_measured(machine)?;
+                    }
                 }
                 bar.inc(1);
             }
@@ -76,6 +86,23 @@ impl Series<'_> {
         })?;
         bar.finish_and_clear();
         Ok(())
+    }
+
+    /// Makes a trial; a machine on which its programme does not get to its end is an outcome, too.
+    fn made(&self, which: &Which<'_>, bar: &ProgressBar) -> Result<Made> {
+        let made = self.how.trial(which, &|line| tell(bar, line));
+        let error = match made {
+            Ok(verdicts) => return Ok(Made::Judged(verdicts)),
+            Err(error) => error,
+        };
+        let Some(machine) = NotMeasured::of(which, &error) else {
+            let Which {
+                arm, seed, index, ..
+            } = which;
+            return Err(error.context(format!("trial {arm} {index}, seed {seed}")));
+        };
+        self.how.tidy(which)?;
+        Ok(Made::NotMeasured(machine))
     }
 
     /// Trials of which the journal lacks a diagnosis, with the rules that are off in those.

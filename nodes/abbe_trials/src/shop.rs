@@ -35,7 +35,7 @@ pub fn trial(how: &How, which: &Which<'_>, tell: &dyn Fn(&str)) -> Result<Vec<Ve
     let Some(session) = ShopSession::draw(which.arm, which.seed, which.index) else {
         bail!("arm {} is none of a shop", which.arm);
     };
-    let name = format!("{}-{}-{:05}", which.arm, which.seed, which.index);
+    let name = which.name();
     let folder = how.out.join(&name);
     if folder.exists() {
         std::fs::remove_dir_all(&folder)?;

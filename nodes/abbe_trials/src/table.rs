@@ -16,6 +16,8 @@ use trials::tally::{Figure, unknown_auroc};
 use trials::target::{Ratio, Target, of_designed, targets};
 use trials::{Arm, Tally, Verdict};
 
+use crate::journal::NotMeasured;
+
 mod arm;
 mod confusion;
 mod designed;
@@ -47,6 +49,8 @@ pub struct Table {
     ablations: Vec<(Arm, Vec<MethodLine>)>,
     unknown: Vec<Figure>,
     refusals: Vec<(String, usize)>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    not_measured: Vec<NotMeasured>,
 }
 
 impl Table {
@@ -93,11 +97,18 @@ impl Table {
                 .flat_map(|both| [0.0, 10.0].map(|d| unknown_auroc(&verdicts, both, d)))
                 .collect(),
             refusals: refusals(&verdicts),
+            not_measured: vec![],
         };
         if is_designed {
             table.first_lines = designed::ten_lines(&table, ratio);
         }
         table
+    }
+
+    /// The same with the machines that are in no rate, for they could not be measured.
+    pub fn without(mut self, not_measured: Vec<NotMeasured>) -> Self {
+        self.not_measured = not_measured;
+        self
     }
 
     /// As it stands on a terminal.
@@ -195,6 +206,14 @@ impl Table {
         for (reason, count) in &self.refusals {
             lines.push(format!("{count} not diagnosed: {reason}"));
         }
+        if !self.not_measured.is_empty() {
+            lines.push(format!(
+                "{} of {} drawn machines could not be measured and are in no rate.",
+                self.not_measured.len(),
+                self.not_measured.len() + self.trials
+            ));
+        }
+        lines.extend(self.not_measured.iter().map(ToString::to_string));
         lines
     }
 

@@ -42,6 +42,11 @@ pub struct Which<'w> {
 }
 
 impl Which<'_> {
+    /// What its folder and its seal are called.
+    pub fn name(&self) -> String {
+        format!("{}-{}-{:05}", self.arm, self.seed, self.index)
+    }
+
     /// Whether what is left on held-out runs is compared with a machine that hides nothing.
     fn has_oracle(&self) -> bool {
         matches!(
@@ -97,7 +102,7 @@ impl How {
         if self.in_process {
             return self.within(which, trial, began);
         }
-        let name = format!("{}-{}-{:05}", which.arm, which.seed, which.index);
+        let name = which.name();
         let folder = self.out.join(&name);
         if folder.exists() {
             std::fs::remove_dir_all(&folder)?;
@@ -145,6 +150,18 @@ impl How {
             std::fs::remove_dir_all(&folder)?;
         }
         Ok(verdicts(&seal.open()?, &seal.sha256, said))
+    }
+
+    /// Takes away the folder of a trial that was not made to its end.
+    ///
+    /// # Errors
+    /// When that cannot be done.
+    pub fn tidy(&self, which: &Which<'_>) -> Result<()> {
+        let folder = self.out.join(which.name());
+        if !self.keep && folder.exists() {
+            std::fs::remove_dir_all(&folder).with_context(|| format!("{}", folder.display()))?;
+        }
+        Ok(())
     }
 
     /// The machine with what it hides and the programme that measures it.

@@ -93,3 +93,11 @@ pub enum TrialError {
         size: f64,
     },
 }
+
+impl TrialError {
+    /// Whether a programme began on the plant and did not get to its end: that is so of this machine alone.
+    #[must_use]
+    pub const fn is_of_the_plant(&self) -> bool {
+        matches!(self, Self::Failed { .. } | Self::Endless { .. })
+    }
+}
