@@ -59,7 +59,7 @@ impl ExpandedAngle {
 pub struct ExpandedRate {
     /// The figure, mm/s.
     pub value_mm_s: f64,
-    /// Expanded uncertainty with the coverage factor [`COVERAGE_FACTOR`], mm/s.
+    /// Expanded uncertainty, mm/s; the coverage factor is [`COVERAGE_FACTOR`] where the figure's owner states no other one.
     pub expanded_uncertainty_mm_s: f64,
 }
 

@@ -5,9 +5,9 @@
 //! measurement (after ISO/TR 230-9) and [`conformance`] compares a figure with a limit
 //! (ISO 14253-1). [`breakdown`] finds which faults of a machine make a circle out of round.
 //!
-//! Deviations are measured minus nominal, mm. Expanded uncertainties have the coverage factor 2.
-//! They speak of the measurement; how well the machine repeats is itself a figure and not part of
-//! them. Nothing of a budget has a default: what is left out would be an uncertainty of zero.
+//! Deviations are measured minus nominal, mm. Expanded uncertainties have the coverage factor 2
+//! where no other one stands beside them. They speak of the measurement; how well the machine
+//! repeats is itself a figure and not part of them. Nothing of a budget has a default: what is left out would be an uncertainty of zero.
 //!
 //! The texts of the standards were not at hand. Definitions are those on which the published
 //! literature and other programs agree, and uncertainties are derived here by the GUM from the

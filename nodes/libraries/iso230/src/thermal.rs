@@ -18,18 +18,19 @@
 //! | symbol | here | unit |
 //! |---|---|---|
 //! | t, τ | `drift_after_s`, `rate_window_s` | s |
+//! | l, α, a_α, Δθ, θ, a_θ | [`Artefact`], [`ArtefactTemperature`] | mm, 1/K, K, °C |
 //! | h | `height_mm` | mm |
 //! | s | `reading_scatter_mm`, by (7) [`scatter_mm`] | mm |
 //!
 //! Uncertainties, with U₀, U₁ and k of the instrument's certificate, s of the scatter of one reading, and an artefact of
-//! length l and coefficient α whose temperature stays within a range Δθ, so that it may grow or shrink by up to α l Δθ.
-//! d_t and range are differences of two readings: the constant part of the certificate and the scatter enter twice, the part
-//! that grows with the length once, for the length d between the readings:
+//! length l, coefficient α within ± a_α, and a temperature that stays within a range Δθ: it may grow or shrink by up to
+//! a_l = (α + a_α) l Δθ. d_t and range are differences of two readings: the constant part of the certificate and the scatter
+//! enter twice, the part that grows with the length once, for the length d between the readings:
 //!
 //! ```text
-//!   d_t, range:  u² = [2 U₀² + (U₁ d)²]/k² + 2 s² + (α l Δθ)²/3                        (5)
+//!   d_t, range:  u² = [2 U₀² + (U₁ d)²]/k² + 2 s² + a_l²/3                             (5)
 //!   an angle:    u² = 4 (U₀²/k² + s²)/(h₂ − h₁)²
-//!   rate v:      u² = s²/Σ(t − t̄)² + [g² U₀² + (U₁ v τ)²]/(k τ)² + (α l Δθ)²/(3 T²)    (6)
+//!   rate v:      u² = s²/Σ(t − t̄)² + [g² U₀² + (U₁ v τ)²]/(k τ)² + a_l²/(3 T²)         (6)
 //!   s² = mean of e_i²/(1 + w_i² + (1 − w_i)²),   e_i = x_i − [w_i x_{i−1} + (1 − w_i) x_{i+1}],
 //!        w_i = (t_{i+1} − t_i)/(t_{i+1} − t_{i−1})                                    (7)
 //! ```
@@ -52,11 +53,28 @@
 //! straight line between its neighbours, whose three variances add to the denominator: a drift that bends between
 //! neighbours makes s greater, never smaller.
 //!
+//! Where thermometers read the artefact, each θ_i is off by a constant and by at most ± a_θ. Its growth is taken out of the
+//! displacement X that the instrument read, before (1) to (3). The sign is that of growth in the displacement:
+//!
+//! ```text
+//!   x_i = X_i ∓ α l (θ_i − θ₀)                                                        (9)
+//!   d_t, range:  u² = [2 U₀² + (U₁ D)²]/k² + 2 s² + [2 (α l a_θ)² + (l Δθ a_α)²]/3     (10)
+//!   rate v:      u² = s²/Σ(t − t̄)² + [g² U₀² + (U₁ V τ)²]/(k τ)²
+//!                     + [2 (α l a_θ/τ)² + (l θ' a_α)²]/3                              (11)
+//!   U = k u,  k of the normal part u_n (certificate, scatter) and of the limits behind it: (7) of the budget     (12)
+//!   U = 2 u_n + a_l, of the rate 2 u_n + a_l/T, where a range alone is known;  k = U/u                (13)
+//! ```
+//!
+//! D and V are d and v of X, and s is of X as well: the instrument's error goes by what it read. Δθ lies between the two
+//! instants of the figure: 0 and t, or the extremes. θ' is the slope of θ over the window by the line of (3). (13)
+//! is a bound, with k from 2 to √7: a body that warms throughout has grown by all of a_l at the end, and (12) would take it for
+//! anywhere within. Without an artefact k is 2.
+//!
 //! # Holds when
 //! What is sampled is slow beside the samples: between two of them (1) takes a straight line. (8) takes the drift in the window
-//! as straight. The
-//! growth of the artefact is one for both heights and leaves the angle. An artefact that warms up in steps during the test
-//! can grow by more than τ/T in the last τ.
+//! as straight. The growth of the artefact is one for both heights and leaves the angle. An artefact that warms up in steps
+//! during the test can grow by more than τ/T in the last τ of (6). (10) and (11) take an error of the temperature that has
+//! changed between the two instants, or over the window: one that wanders within 20 to 60 min. A slower one makes U too wide.
 //!
 //! # Agreement
 //! Closed form: `val_iso230_3_an_exponential_drift_has_its_closed_form`, d and range below 1e-15 mm,
@@ -65,31 +83,35 @@
 //!
 //! (5) by hand: `eq5_certificate_scatter_and_artefact_by_hand`; (7): `eq7_scatter_of_noise_on_a_line_by_hand`, and numpy on a
 //! table (`val_a_warm_up_logged_once_is_evaluated_by_iso_230_3`). (8): `eq8_the_slope_of_a_wave_is_that_of_sampled_lines`.
+//! (9): `eq9_growth_that_was_read_is_taken_out`; (10) to (12): `eq10_eq11_eq12_of_a_read_artefact_by_hand`; (13):
+//! `eq13_k_of_a_bound_by_hand`. How often U holds: `iso230_3_u_holds_the_drift_beside_a_mandrel_that_is_read`.
 //!
 //! # References
 //! \[1\] ISO 230-3:2020; from the literature, the text was not at hand. \[2\] JCGM 100:2008 (GUM), 4.2, 4.3 and 5.1.
 
+mod artefact;
+mod height;
+mod wave;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::budget::{DeviceUncertainty, combined, rectangular};
+use super::budget::{DeviceUncertainty, combined};
 use super::error::ChannelFault;
 use super::extent::{
     check_ascending, check_finite, check_length, check_not_negative, check_points, check_positive,
     range,
 };
 use super::{ExpandedAngle, ExpandedAngularRate, ExpandedLength, ExpandedRate, Iso230Error};
+use artefact::Left;
+pub use artefact::{Artefact, ArtefactTemperature, GrowthReads};
+pub use height::{height_name, height_of};
 use metrology::Axis;
 use metrology::fit::fit_line;
+use wave::wave_in_slope;
 
 /// Samples without which a rate has no uncertainty.
 const MIN_SAMPLES_OF_RATE: usize = 3;
-/// Where g of (8) is greatest.
-const GREATEST_K: f64 = 2.081_576;
-/// g there.
-const GREATEST_G: f64 = 2.617_10;
-/// Below it, the first term of j₁ is exact to nine digits.
-const SMALL_K: f64 = 1e-4;
 
 /// What made the machine drift.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -105,25 +127,6 @@ pub enum DriftCause {
     RotaryAxis,
     /// Several of these at once, or unknown.
     NotStated,
-}
-
-/// Before the zero of a sensor, in a name that states its height.
-const HEIGHT_OF: &str = "height_of_zero_";
-/// Between that zero and the height.
-const IS_MM: &str = "_mm=";
-
-/// A name by which a recording states the height (mm) of the sensor whose readings have a zero: `height_of_zero_1_mm=110`.
-#[must_use]
-pub fn height_name(zero_id: u32, height_mm: f64) -> String {
-    format!("{HEIGHT_OF}{zero_id}{IS_MM}{height_mm}")
-}
-
-/// Zero and height (mm) of such a name; none of another one.
-#[must_use]
-pub fn height_of(name: &str) -> Option<(u32, f64)> {
-    let (zero, height) = name.strip_prefix(HEIGHT_OF)?.split_once(IS_MM)?;
-    let height_mm: f64 = height.parse().ok()?;
-    Some((zero.parse().ok()?, height_mm)).filter(|_| height_mm.is_finite())
 }
 
 /// Displacements at one place.
@@ -157,7 +160,7 @@ pub struct DriftTest {
 }
 
 /// What is not known about a drift test.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DriftBudget {
     /// Certificate of the instrument that reads the displacements.
@@ -167,12 +170,9 @@ pub struct DriftBudget {
     /// Period over which the instrument's error repeats along the displacement, λ of (8), mm; none: it is not stated.
     #[serde(default)]
     pub sensor_error_period_mm: Option<f64>,
-    /// Length of the artefact between its seat and the sensors, mm.
-    pub artefact_length_mm: f64,
-    /// Coefficient of expansion of the artefact, 1/K.
-    pub artefact_expansion_per_k: f64,
-    /// Range of the artefact's temperature over the test, K.
-    pub artefact_temperature_range_k: f64,
+    /// The artefact, as far as its growth is in the displacements; none: it is not, or it counts as drift.
+    #[serde(default)]
+    pub artefact: Option<Artefact>,
 }
 
 /// Drift of one channel.
@@ -184,10 +184,16 @@ pub struct DisplacementDrift {
     pub height_mm: f64,
     /// d_t, (1).
     pub drift_after: ExpandedLength,
+    /// k of U of d_t, (12) or (13).
+    pub drift_after_coverage_factor: f64,
     /// (2): ETVE where the surroundings are the cause.
     pub range: ExpandedLength,
+    /// k of U of the range, (12) or (13).
+    pub range_coverage_factor: f64,
     /// (3).
     pub final_rate: ExpandedRate,
+    /// k of U of the rate, (12) or (13).
+    pub final_rate_coverage_factor: f64,
     /// What the uncertainty of the range consists of.
     pub contributions: DriftContributions,
 }
@@ -204,17 +210,14 @@ pub struct DriftContributions {
 }
 
 impl DriftContributions {
-    /// For two readings that are `difference_mm` apart.
-    fn new(budget: &DriftBudget, difference_mm: f64) -> Self {
+    /// Of two readings, with what the growth of the artefact leaves.
+    fn new(budget: &DriftBudget, between: &Between, left_mm: &Left) -> Self {
         let constant_mm = budget.sensor.standard_mm(0.0);
-        let by_length_mm = budget.sensor.standard_mm(difference_mm) - constant_mm;
-        let growth_mm = budget.artefact_length_mm
-            * budget.artefact_expansion_per_k
-            * budget.artefact_temperature_range_k;
+        let by_length_mm = budget.sensor.standard_mm(between.read_mm) - constant_mm;
         Self {
             certificate_mm: (2.0 * constant_mm.powi(2) + by_length_mm.powi(2)).sqrt(),
             scatter_mm: 2.0_f64.sqrt() * budget.reading_scatter_mm,
-            artefact_mm: rectangular(growth_mm),
+            artefact_mm: left_mm.standard(),
         }
     }
 
@@ -222,6 +225,32 @@ impl DriftContributions {
     #[must_use]
     pub fn combined_mm(&self) -> f64 {
         combined(&[self.certificate_mm, self.scatter_mm, self.artefact_mm])
+    }
+}
+
+/// Two readings.
+struct Between {
+    /// What they differ by without the growth of the artefact, mm.
+    value_mm: f64,
+    /// What the instrument read of that, mm.
+    read_mm: f64,
+    /// What the temperature of the artefact changed by, where it was read, K.
+    change_k: f64,
+}
+
+impl Between {
+    /// The difference with its U and k, and the parts of its uncertainty.
+    fn expanded(&self, budget: &DriftBudget) -> (ExpandedLength, f64, DriftContributions) {
+        let artefact = budget.artefact.as_ref();
+        let left_mm = artefact.map(|it| it.left_mm(self.change_k));
+        let left_mm = left_mm.unwrap_or_default();
+        let parts = DriftContributions::new(budget, self, &left_mm);
+        let k = left_mm.coverage_factor(parts.certificate_mm.hypot(parts.scatter_mm)); // (12), (13)
+        let figure = ExpandedLength {
+            value_mm: self.value_mm,
+            expanded_uncertainty_mm: k * parts.combined_mm(), // (5), (10)
+        };
+        (figure, k, parts)
     }
 }
 
@@ -262,7 +291,7 @@ pub struct DriftResult {
 /// together, channels that make no angle, numbers that cannot be used.
 pub fn evaluate(test: &DriftTest, budget: &DriftBudget) -> Result<DriftResult, Iso230Error> {
     test.check()?;
-    budget.check()?;
+    budget.check(test.times_s.len())?;
     let displacements = test
         .channels
         .iter()
@@ -307,28 +336,75 @@ fn displacement(
     channel: &DriftChannel,
     budget: &DriftBudget,
 ) -> Result<DisplacementDrift, Iso230Error> {
-    let values_mm = &channel.displacements_mm;
-    let of = |value_mm: f64| {
-        let parts = DriftContributions::new(budget, value_mm);
-        (ExpandedLength::new(value_mm, parts.combined_mm()), parts) // (5)
+    let read_mm = &channel.displacements_mm;
+    let artefact = budget.artefact.as_ref();
+    let without_growth_mm = artefact.map(|it| it.without_growth_mm(read_mm)); // (9)
+    let values_mm = without_growth_mm.as_ref().unwrap_or(read_mm);
+    let degc = artefact.and_then(Artefact::degc);
+    let between = |of: &dyn Fn(&[f64]) -> f64| Between {
+        value_mm: of(values_mm),
+        read_mm: of(read_mm),
+        change_k: degc.map_or(0.0, of),
     };
-    let (drift_after, _) = of(test.drift(values_mm));
-    let (range, contributions) = of(range(values_mm.iter().copied()));
-    let line = test.rate(values_mm)?;
-    let share = test.rate_window_s / test.duration_s();
-    let u_rate_mm_s = combined(&[
-        line.slope_by_scatter(budget.reading_scatter_mm),
-        budget.rate_by_certificate(line.slope * test.rate_window_s) / test.rate_window_s,
-        share * contributions.artefact_mm / test.rate_window_s,
-    ]); // (6)
+    let after = between(&|values| test.drift(values));
+    let (drift_after, drift_after_coverage_factor, _) = after.expanded(budget);
+    let [least, greatest] = extremes(values_mm);
+    let whole = between(&|values| values[greatest] - values[least]);
+    let (range, range_coverage_factor, contributions) = whole.expanded(budget);
+    let (final_rate, final_rate_coverage_factor) = rate(test, [values_mm, read_mm], budget)?;
     Ok(DisplacementDrift {
         axis: channel.axis,
         height_mm: channel.height_mm,
         drift_after,
+        drift_after_coverage_factor,
         range,
-        final_rate: ExpandedRate::new(line.slope, u_rate_mm_s),
+        range_coverage_factor,
+        final_rate,
+        final_rate_coverage_factor,
         contributions,
     })
+}
+
+/// (3) of displacements without growth and as they were read, with U by (6) or (11), and k.
+fn rate(
+    test: &DriftTest,
+    [values_mm, read_mm]: [&[f64]; 2],
+    budget: &DriftBudget,
+) -> Result<(ExpandedRate, f64), Iso230Error> {
+    let (line, as_read) = (test.rate(values_mm)?, test.rate(read_mm)?);
+    let window_s = test.rate_window_s;
+    let normal_mm_s = combined(&[
+        line.slope_by_scatter(budget.reading_scatter_mm),
+        budget.rate_by_certificate(as_read.slope * window_s) / window_s,
+    ]);
+    let mut left_mm_s = Left::default();
+    if let Some(artefact) = &budget.artefact {
+        let slope_k_s = match artefact.degc() {
+            Some(degc) => test.rate(degc)?.slope,
+            None => 0.0,
+        };
+        left_mm_s = artefact.left_of_rate_mm_s(slope_k_s, (window_s, test.duration_s()));
+    }
+    let k = left_mm_s.coverage_factor(normal_mm_s); // (12), (13)
+    let rate = ExpandedRate {
+        value_mm_s: line.slope,
+        expanded_uncertainty_mm_s: k * normal_mm_s.hypot(left_mm_s.standard()), // (6), (11)
+    };
+    Ok((rate, k))
+}
+
+/// Places of the least and of the greatest value; there is one at least.
+fn extremes(values: &[f64]) -> [usize; 2] {
+    let (mut least, mut greatest) = (0, 0);
+    for (place, value) in values.iter().enumerate() {
+        if *value < values[least] {
+            least = place;
+        }
+        if *value > values[greatest] {
+            greatest = place;
+        }
+    }
+    [least, greatest]
 }
 
 impl DriftTest {
@@ -437,19 +513,6 @@ impl RateLine {
     }
 }
 
-/// g of (8) for a travel v τ over a period λ.
-fn wave_in_slope(travel_mm: f64, period_mm: f64) -> f64 {
-    let k = std::f64::consts::PI * travel_mm.abs() / period_mm;
-    if k < SMALL_K {
-        // j₁ = K/3 − K³/30 + …
-        return 2.0 * k;
-    }
-    if k <= GREATEST_K {
-        return 6.0 * (k.sin() - k * k.cos()) / (k * k);
-    }
-    GREATEST_G.min(6.0 * (1.0 + 1.0 / (k * k)).sqrt() / k)
-}
-
 impl DriftBudget {
     /// Second part of (6) for a travel v τ of the window, mm.
     fn rate_by_certificate(&self, travel_mm: f64) -> f64 {
@@ -460,18 +523,14 @@ impl DriftBudget {
         (g * constant_mm).hypot(by_length_mm)
     }
 
-    fn check(&self) -> Result<(), Iso230Error> {
+    fn check(&self, n_times: usize) -> Result<(), Iso230Error> {
         self.sensor.check()?;
         if let Some(period_mm) = self.sensor_error_period_mm {
             check_positive("sensor_error_period_mm", period_mm)?;
         }
         check_not_negative("reading_scatter_mm", self.reading_scatter_mm)?;
-        check_not_negative("artefact_length_mm", self.artefact_length_mm)?;
-        check_not_negative("artefact_expansion_per_k", self.artefact_expansion_per_k)?;
-        check_not_negative(
-            "artefact_temperature_range_k",
-            self.artefact_temperature_range_k,
-        )
+        let artefact = self.artefact.as_ref();
+        artefact.map_or(Ok(()), |artefact| artefact.check(n_times))
     }
 }
 
@@ -512,61 +571,4 @@ fn angle(
         range: ExpandedAngle::new(range(angles.iter().copied()), u_rad),
         final_rate: ExpandedAngularRate::new(line.slope, u_rate_rad_s),
     }))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn eq8_the_slope_of_a_wave_is_that_of_sampled_lines() {
-        // Least-squares slopes of sampled waves of 24 phases, by the two sums of a regression.
-        let n = 2001;
-        let sampled = |travel: f64| {
-            let mut squares = 0.0;
-            for phase in 0..24 {
-                let phi = std::f64::consts::TAU * f64::from(phase) / 24.0;
-                let (mut top, mut bottom) = (0.0, 0.0);
-                for i in 0..n {
-                    let t = f64::from(i) / f64::from(n - 1) - 0.5;
-                    let wave = (std::f64::consts::TAU * travel * t + phi).sin();
-                    top += t * wave;
-                    bottom += t * t;
-                }
-                squares += (top / bottom).powi(2) / 24.0;
-            }
-            // Of a wave with standard deviation 1.
-            (2.0 * squares).sqrt()
-        };
-        for travel in [1e-6, 0.01, 0.1, 0.3, 0.6, 0.66] {
-            let (found, wanted) = (wave_in_slope(travel, 1.0), sampled(travel));
-            assert!(
-                (found - wanted).abs() < 3e-3 * wanted + 1e-9,
-                "{travel}: {found} {wanted}"
-            );
-        }
-        for travel in [0.7, 0.9, 1.3, 2.0, 3.7, 12.2] {
-            assert!(
-                wave_in_slope(travel, 1.0) >= 0.999 * sampled(travel),
-                "{travel}"
-            );
-        }
-        assert!(wave_in_slope(0.0, 1.0).abs() < 1e-30);
-    }
-
-    #[test]
-    fn a_height_reads_back_and_other_names_have_none() {
-        for (zero_id, height_mm) in [(1, 110.0), (2, -0.125), (7, 260.5)] {
-            let found = height_of(&height_name(zero_id, height_mm));
-            assert_eq!(found, Some((zero_id, height_mm)));
-        }
-        for name in [
-            "spindle",
-            "height_of_zero_1",
-            "height_of_zero_x_mm=1",
-            "height_of_zero_1_mm=inf",
-        ] {
-            assert_eq!(height_of(name), None, "{name}");
-        }
-    }
 }

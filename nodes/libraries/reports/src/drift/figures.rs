@@ -1,13 +1,15 @@
 //! The figures of ISO 230-3 of one displacement over time.
 
 use iso230::budget::DeviceUncertainty;
-use iso230::thermal::{self, DriftBudget, DriftCause, DriftChannel, DriftContributions, DriftTest};
+use iso230::thermal::{
+    self, Artefact, DisplacementDrift, DriftBudget, DriftCause, DriftChannel, DriftContributions,
+    DriftTest,
+};
 use iso230::{ExpandedLength, ExpandedRate, Iso230Error};
 use metrology::Axis;
 use serde::Serialize;
 
 use super::HOUR_S;
-use crate::evaluate::budget::MandrelGrowth;
 use crate::positioning::{figure, with_u};
 use crate::section::um;
 
@@ -38,6 +40,35 @@ pub(super) struct Figures {
     /// What the uncertainty of the range consists of, where it is stated by causes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contributions: Option<DriftContributions>,
+    /// k of each U, where a mandrel grows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coverage_factors: Option<CoverageFactors>,
+}
+
+/// k of U of the figures of the same name.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct CoverageFactors {
+    pub after_1_h: Option<f64>,
+    pub after_3_h: Option<f64>,
+    pub at_end: f64,
+    pub range_last_hour: Option<f64>,
+    pub range: f64,
+    pub final_rate: f64,
+}
+
+impl CoverageFactors {
+    /// Such as `k = 1.97 after 1 h, 1.92 of the range, 1.88 of the last rate`: those of the cells.
+    pub(super) fn in_words(&self) -> String {
+        let all = [
+            (self.after_1_h, "after 1 h"),
+            (self.after_3_h, "after 3 h"),
+            (Some(self.range), "of the range"),
+            (Some(self.final_rate), "of the last rate"),
+        ];
+        let stated = all.into_iter().filter_map(|(k, of)| Some((k?, of)));
+        let each: Vec<String> = stated.map(|(k, of)| format!("{k:.2} {of}")).collect();
+        format!("k = {}", each.join(", "))
+    }
 }
 
 /// Standard deviation of one of these readings (s since the first, mm) by scatter, mm; zero where they are too few.
@@ -47,7 +78,7 @@ pub(super) fn scatter_mm(values: &[(f64, f64)]) -> f64 {
 }
 
 /// What read displacements, and on what.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Reader {
     /// Certificate of the instrument.
     pub sensor: DeviceUncertainty,
@@ -55,8 +86,8 @@ pub(super) struct Reader {
     pub reading_scatter_mm: f64,
     /// Period of its error along the displacement, where it is stated, mm.
     pub error_period_mm: Option<f64>,
-    /// The mandrel, as far as its growth is in the displacement.
-    pub mandrel: MandrelGrowth,
+    /// The mandrel, as far as its growth is in the displacement, with a temperature at each of them where it is read.
+    pub mandrel: Option<Artefact>,
 }
 
 impl Reader {
@@ -66,19 +97,17 @@ impl Reader {
             sensor,
             reading_scatter_mm: 0.0,
             error_period_mm: None,
-            mandrel: MandrelGrowth::NONE,
+            mandrel: None,
         }
     }
 
-    /// For the evaluation of ISO 230-3.
-    pub(super) const fn budget(&self) -> DriftBudget {
+    /// For the evaluation of ISO 230-3 of the readings from the `first` on.
+    pub(super) fn budget(&self, first: usize) -> DriftBudget {
         DriftBudget {
             sensor: self.sensor,
             reading_scatter_mm: self.reading_scatter_mm,
             sensor_error_period_mm: self.error_period_mm,
-            artefact_length_mm: self.mandrel.length_mm,
-            artefact_expansion_per_k: self.mandrel.expansion_per_k,
-            artefact_temperature_range_k: self.mandrel.temperature_range_k,
+            artefact: { self.mandrel.clone() }.map(|mandrel| mandrel.since_reading(first)),
         }
     }
 }
@@ -96,6 +125,46 @@ pub(super) fn rate_window_s(times_s: &[f64]) -> f64 {
     }
 }
 
+/// A log of which parts are evaluated.
+struct Log<'a> {
+    axis: Axis,
+    cause: DriftCause,
+    /// Times (s since the first) and displacements (mm).
+    values: &'a [(f64, f64)],
+    reader: &'a Reader,
+}
+
+impl Log<'_> {
+    /// Drift, range and rate of the readings from the `first` on.
+    fn part(
+        &self,
+        first: usize,
+        (drift_after_s, rate_window_s): (f64, f64),
+    ) -> Result<DisplacementDrift, Iso230Error> {
+        let values = self.values.get(first..).unwrap_or_default();
+        let first_s = values.first().map_or(0.0, |(time_s, _)| *time_s);
+        let test = DriftTest {
+            cause: self.cause,
+            times_s: values.iter().map(|(time_s, _)| time_s - first_s).collect(),
+            channels: vec![DriftChannel {
+                axis: self.axis,
+                height_mm: 0.0,
+                displacements_mm: values.iter().map(|(_, mm)| *mm).collect(),
+            }],
+            drift_after_s,
+            rate_window_s,
+            longest_gap_s: LONGEST_PAUSE_S,
+        };
+        let result = thermal::evaluate(&test, &self.reader.budget(first))?;
+        let one = result.displacements.first().copied();
+        one.ok_or(Iso230Error::TooFewPoints {
+            place: "displacements",
+            n: 0,
+            least: 1,
+        })
+    }
+}
+
 /// Evaluates displacements (s since the first, mm).
 ///
 /// # Errors
@@ -109,52 +178,43 @@ pub(super) fn of(
     let times_s: Vec<f64> = values.iter().map(|(time_s, _)| *time_s).collect();
     let recorded_s = times_s.last().copied().unwrap_or(0.0);
     let rate_window_s = rate_window_s(&times_s);
-    let evaluated_part = |values: &[(f64, f64)], (drift_after_s, rate_window_s): (f64, f64)| {
-        let first_s = values.first().map_or(0.0, |(time_s, _)| *time_s);
-        let test = DriftTest {
-            cause,
-            times_s: values.iter().map(|(time_s, _)| time_s - first_s).collect(),
-            channels: vec![DriftChannel {
-                axis,
-                height_mm: 0.0,
-                displacements_mm: values.iter().map(|(_, mm)| *mm).collect(),
-            }],
-            drift_after_s,
-            rate_window_s,
-            longest_gap_s: LONGEST_PAUSE_S,
-        };
-        let result = thermal::evaluate(&test, &reader.budget())?;
-        let one = result.displacements.first().copied();
-        one.ok_or(Iso230Error::TooFewPoints {
-            place: "displacements",
-            n: 0,
-            least: 1,
-        })
+    let log = Log {
+        axis,
+        cause,
+        values,
+        reader,
     };
-    let evaluated = |drift_after_s: f64| evaluated_part(values, (drift_after_s, rate_window_s));
+    let evaluated = |drift_after_s: f64| log.part(0, (drift_after_s, rate_window_s));
     let whole = evaluated(recorded_s.max(f64::MIN_POSITIVE))?;
-    let last_hour = times_s.partition_point(|time_s| *time_s < recorded_s - HOUR_S);
-    let last_hour = values.get(last_hour..).unwrap_or_default();
-    let has_last_hour = recorded_s >= HOUR_S && last_hour.len() >= LEAST_OF_RATE;
-    let last_s = last_hour
-        .first()
-        .map_or(0.0, |(time_s, _)| recorded_s - time_s);
-    let last_hour = has_last_hour.then(|| evaluated_part(last_hour, (last_s, last_s)));
+    let in_last_hour = times_s.partition_point(|time_s| *time_s < recorded_s - HOUR_S);
+    let has_last_hour = recorded_s >= HOUR_S && times_s.len() - in_last_hour >= LEAST_OF_RATE;
+    let last_s = { times_s.get(in_last_hour) }.map_or(0.0, |time_s| recorded_s - time_s);
+    let last_hour = has_last_hour.then(|| log.part(in_last_hour, (last_s, last_s)));
+    let last_hour = last_hour.transpose()?;
     let after = |hours: f64| {
         let reaches = recorded_s >= hours * HOUR_S;
-        let found = reaches.then(|| evaluated(hours * HOUR_S));
-        found.transpose().map(|one| one.map(|one| one.drift_after))
+        reaches.then(|| evaluated(hours * HOUR_S)).transpose()
     };
     let [one, three] = AFTER_H;
+    let (after_1_h, after_3_h) = (after(one)?, after(three)?);
+    let factor = |one: DisplacementDrift| one.drift_after_coverage_factor;
     Ok(Figures {
-        after_1_h: after(one)?,
-        after_3_h: after(three)?,
+        after_1_h: after_1_h.map(|one| one.drift_after),
+        after_3_h: after_3_h.map(|one| one.drift_after),
         at_end: whole.drift_after,
-        range_last_hour: last_hour.transpose()?.map(|one| one.range),
+        range_last_hour: last_hour.map(|one| one.range),
         range: whole.range,
         final_rate: whole.final_rate,
         rate_window_s,
         contributions: Some(whole.contributions),
+        coverage_factors: reader.mandrel.is_some().then(|| CoverageFactors {
+            after_1_h: after_1_h.map(factor),
+            after_3_h: after_3_h.map(factor),
+            at_end: whole.drift_after_coverage_factor,
+            range_last_hour: last_hour.map(|one| one.range_coverage_factor),
+            range: whole.range_coverage_factor,
+            final_rate: whole.final_rate_coverage_factor,
+        }),
     })
 }
 

@@ -169,7 +169,7 @@ impl<'a> Pair<'a> {
                 rate_window_s,
                 longest_gap_s: LONGEST_PAUSE_S,
             };
-            let result = thermal::evaluate(&test, &reader.budget())?;
+            let result = thermal::evaluate(&test, &reader.budget(0))?;
             result
                 .angles
                 .first()

@@ -33,7 +33,7 @@ mod tests;
 
 use super::test_conditions::{Readings, Thermometers};
 pub use ballbar::Ballbar;
-pub use mandrel::{Mandrel, MandrelGrowth};
+pub use mandrel::{Mandrel, Meanwhile};
 use nothing::{NO_BODY, NO_DEVICE};
 pub use statement::{Instrument, Instruments, NOT_STATED};
 
@@ -181,7 +181,7 @@ pub struct Budget {
     /// the window count as independent.
     #[serde(default)]
     length_error_period_um: Option<f64>,
-    /// Test mandrel of ISO 230-3; where absent, what it grows counts as drift of the machine.
+    /// Test mandrel of ISO 230-3; where absent, its growth counts as drift of the machine.
     #[serde(default)]
     mandrel: Option<Mandrel>,
     /// For rotary axes; where absent, their figures have no uncertainty.
@@ -254,7 +254,7 @@ impl Body {
             let silent =
                 || format!("names the thermometer {name}, which has no reading during this test");
             let readings = read.get(name).ok_or_else(silent)?;
-            check_range(name, readings)?;
+            check_range(name, readings, "temperature_deviation_k")?;
             all.push(readings);
         }
         let n = all.len() as f64;
@@ -320,8 +320,8 @@ impl Body {
     }
 }
 
-/// Refuses a thermometer that stopped to measure, or reads what no budget may state.
-fn check_range(name: &str, readings: &Readings) -> Result<(), String> {
+/// Refuses a thermometer that stopped to measure, or reads what no budget may state; `key` would state its body's temperature.
+fn check_range(name: &str, readings: &Readings, key: &str) -> Result<(), String> {
     if let Some(dead) = readings.dead {
         return Err(format!("names a dead thermometer: {}", dead.in_words(name)));
     }
@@ -330,7 +330,7 @@ fn check_range(name: &str, readings: &Readings) -> Result<(), String> {
     let wrong = both.into_iter().find(|degc| !(low..=high).contains(degc));
     wrong.map_or(Ok(()), |degc| {
         Err(format!(
-            "names the thermometer {name}, and {}{name} read {} °C during this test: must be from {low} to {high} °C; is it in K or °F? Where the body was as warm, state temperature_deviation_k instead",
+            "names the thermometer {name}, and {}{name} read {} °C during this test: must be from {low} to {high} °C; is it in K or °F? Where the body was as warm, state {key} instead",
             topics::TEMPERATURE.base,
             number(degc),
         ))

@@ -5,7 +5,10 @@ use iso230::conformance::{Policy, Specification, decide};
 use iso230::diagonal::{self, DiagonalRuns, SpaceDiagonal};
 use iso230::positioning::budget::PositioningBudget;
 use iso230::positioning::{self, PositioningRuns};
-use iso230::thermal::{self, DriftBudget, DriftCause, DriftChannel, DriftTest};
+use iso230::thermal::{
+    self, Artefact, ArtefactTemperature, DriftBudget, DriftCause, DriftChannel, DriftTest,
+    GrowthReads,
+};
 use iso230::{ExpandedLength, Iso230Error, probing};
 use metrology::Axis;
 use proptest::collection::vec;
@@ -198,9 +201,7 @@ fn drift_tests_that_cannot_be_evaluated_are_refused() {
             sensor: EXACT_DEVICE,
             reading_scatter_mm: 0.0,
             sensor_error_period_mm: None,
-            artefact_length_mm: 0.0,
-            artefact_expansion_per_k: 0.0,
-            artefact_temperature_range_k: 0.0,
+            artefact: None,
         };
         thermal::evaluate(&test, &budget).unwrap_err().to_string()
     };
@@ -250,6 +251,85 @@ fn drift_tests_that_cannot_be_evaluated_are_refused() {
         ),
     ] {
         assert_eq!(found, expected);
+    }
+}
+
+fn artefact(temperature: ArtefactTemperature) -> Artefact {
+    Artefact {
+        length_mm: 200.0,
+        expansion_per_k: 11.5e-6,
+        expansion_half_width_per_k: 1e-6,
+        temperature,
+    }
+}
+
+fn read(degc: Vec<f64>, half_width_k: f64) -> Artefact {
+    artefact(ArtefactTemperature::Read {
+        degc,
+        half_width_k,
+        growth_reads: GrowthReads::Less,
+    })
+}
+
+#[test]
+fn artefacts_that_cannot_grow_so_are_refused() {
+    let words = |artefact: Artefact| {
+        let budget = DriftBudget {
+            sensor: EXACT_DEVICE,
+            reading_scatter_mm: 0.0,
+            sensor_error_period_mm: None,
+            artefact: Some(artefact),
+        };
+        thermal::evaluate(&drift(), &budget)
+            .unwrap_err()
+            .to_string()
+    };
+    let known = || read(vec![20.0; 100], 0.1);
+    let changed = |change: fn(&mut Artefact)| {
+        let mut artefact = known();
+        change(&mut artefact);
+        words(artefact)
+    };
+    let nan_at_7 = (0..100).map(|k| if k == 7 { f64::NAN } else { 20.0 });
+    for (found, expected) in [
+        (
+            changed(|a| a.length_mm = -1.0),
+            "artefact.length_mm = -1 mm: must be at least 0",
+        ),
+        (
+            changed(|a| a.expansion_per_k = f64::NAN),
+            "artefact.expansion_per_k = NaN",
+        ),
+        (
+            changed(|a| a.expansion_half_width_per_k = -1e-6),
+            "artefact.expansion_half_width_per_k = -",
+        ),
+        (
+            words(read(vec![20.0; 100], -0.1)),
+            "artefact.temperature.half_width_k = -0.1 K: must be at least 0",
+        ),
+        (
+            words(read(vec![20.0; 100], f64::INFINITY)),
+            "artefact.temperature.half_width_k = inf",
+        ),
+        (
+            words(read(vec![20.0; 99], 0.1)),
+            "artefact.temperature.degc[0] has 99 values, but 100 belong there",
+        ),
+        (
+            words(read(nan_at_7.collect(), 0.1)),
+            "artefact.temperature.degc[0], value 7 is NaN: must be finite",
+        ),
+        (
+            words(artefact(ArtefactTemperature::Range { range_k: -2.0 })),
+            "artefact.temperature.range_k = -2 K: must be at least 0",
+        ),
+        (
+            words(artefact(ArtefactTemperature::Range { range_k: f64::NAN })),
+            "artefact.temperature.range_k = NaN",
+        ),
+    ] {
+        assert!(found.starts_with(expected), "{found}: {expected}");
     }
 }
 
@@ -345,7 +425,8 @@ proptest! {
 
     #[test]
     fn prop_no_shape_of_valid_length_makes_an_evaluation_panic(
-        values in vec(any(), 40), radius in any(), after in any(), window in any()
+        values in vec(any(), 40), radius in any(), after in any(), window in any(),
+        temperatures_degc in vec(any(), 40), half_width in any(),
     ) {
         let trace = CircularTrace::Radial {
             angles_rad: values.iter().enumerate().map(|(k, v)| k as f64 * 0.16 + v * 1e-3).collect(),
@@ -375,9 +456,7 @@ proptest! {
             sensor: EXACT_DEVICE,
             reading_scatter_mm: 0.0,
             sensor_error_period_mm: None,
-            artefact_length_mm: 0.0,
-            artefact_expansion_per_k: 0.0,
-            artefact_temperature_range_k: 0.0,
+            artefact: Some(read(temperatures_degc, half_width)),
         };
         let _ = thermal::evaluate(&test, &budget);
     }

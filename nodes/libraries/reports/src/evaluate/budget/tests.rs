@@ -170,27 +170,32 @@ fn a_circular_budget_counts_the_plates_constant_once_and_its_expansion_too() {
 
 #[test]
 fn every_number_has_a_largest_value_and_one_beyond_it_is_refused_with_both() {
-    let text = format!(
-        "{WHOLE}angular_reference: {{expanded_uncertainty_arcsec: 0.4, coverage_factor: 2.0, environmental_drift_arcsec: 0.2}}\nplate_squareness_urad: 2.0\nlength_error_period_um: 0.3\nmandrel: {{length_mm: 250.0, expansion_um_per_m_k: 1.5, temperature_range_k: 2.0}}\n"
-    );
-    let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
-    for (key, value) in budget.numbers() {
-        assert!(greatest(key) < 1e6, "{key} has no largest value");
-        let (parent, name) = key.split_once('.').unwrap_or(("", key));
-        let of_parent = text.find(&format!("\n{parent}")).unwrap();
-        let place = of_parent + text[of_parent..].find(name).unwrap();
-        for far in ["1e300", "1e5", ".inf", ".nan", "-1e-9"] {
-            let old = format!("{name}: {value:?}");
-            let wrong = text[place..].replacen(&old, &format!("{name}: {far}"), 1);
-            let wrong = format!("{}{wrong}", &text[..place]);
-            assert_ne!(wrong, text, "{key}");
-            let error = Budget::read(&wrong, Path::new("budget.yaml")).unwrap_err();
-            let error = format!("{error:#}");
-            let limit = quantity(key, greatest(key));
-            assert!(
-                error.contains(key) && error.contains(&limit),
-                "{far}: {error}"
-            );
+    for mandrel in [
+        "temperature_range_k: 2.0",
+        "thermometers: [a], temperature_half_width_k: 0.2, expansion_half_width_um_per_m_k: 0.1, growth_reads: less",
+    ] {
+        let text = format!(
+            "{WHOLE}angular_reference: {{expanded_uncertainty_arcsec: 0.4, coverage_factor: 2.0, environmental_drift_arcsec: 0.2}}\nplate_squareness_urad: 2.0\nlength_error_period_um: 0.3\nmandrel: {{length_mm: 250.0, expansion_um_per_m_k: 1.5, {mandrel}}}\n"
+        );
+        let budget = Budget::read(&text, Path::new("budget.yaml")).unwrap();
+        for (key, value) in budget.numbers() {
+            assert!(greatest(key) < 1e6, "{key} has no largest value");
+            let (parent, name) = key.split_once('.').unwrap_or(("", key));
+            let of_parent = text.find(&format!("\n{parent}")).unwrap();
+            let place = of_parent + text[of_parent..].find(name).unwrap();
+            for far in ["1e300", "1e5", ".inf", ".nan", "-1e-9"] {
+                let old = format!("{name}: {value:?}");
+                let wrong = text[place..].replacen(&old, &format!("{name}: {far}"), 1);
+                let wrong = format!("{}{wrong}", &text[..place]);
+                assert_ne!(wrong, text, "{key}");
+                let error = Budget::read(&wrong, Path::new("budget.yaml")).unwrap_err();
+                let error = format!("{error:#}");
+                let limit = quantity(key, greatest(key));
+                assert!(
+                    error.contains(key) && error.contains(&limit),
+                    "{far}: {error}"
+                );
+            }
         }
     }
     let factor = refusal("coverage_factor: 2.0", "coverage_factor: 200.0");

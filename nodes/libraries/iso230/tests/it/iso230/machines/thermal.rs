@@ -4,12 +4,13 @@ use std::f64::consts::TAU;
 
 use iso230::budget::DeviceUncertainty;
 use iso230::thermal::{
-    DriftBudget, DriftCause, DriftChannel, DriftResult, DriftTest, evaluate, scatter_mm,
+    Artefact, ArtefactTemperature, DriftBudget, DriftCause, DriftChannel, DriftResult, DriftTest,
+    GrowthReads, evaluate, scatter_mm,
 };
 use metrology::axis::Axis;
 use rand_pcg::Pcg64Mcg;
 
-use super::{Held, MACHINES, UM, between, hold_clause, machine, normal, shares};
+use super::{Held, MACHINES, UM, between, hold_clause, machine, normal, shares, within_limits};
 
 /// Three hours, a reading a minute.
 const READINGS: u32 = 181;
@@ -78,8 +79,104 @@ fn of_truth(times_s: &[f64], values: &[f64]) -> [f64; 3] {
 struct Stated {
     /// The period of the sensors' error.
     period: bool,
-    /// The mandrel, which grows then.
-    mandrel: bool,
+    mandrel: Known,
+}
+
+/// What is known of the mandrel's growth.
+#[derive(Clone, Copy)]
+enum Known {
+    /// That there is none.
+    Rigid,
+    /// The range of its temperature.
+    Range,
+    /// Its temperature, by a thermometer.
+    Read,
+}
+
+/// A mandrel that grows, and what the budget has of it.
+struct Mandrel {
+    growth_mm: Vec<f64>,
+    stated: Option<Artefact>,
+}
+
+impl Mandrel {
+    /// One that warms or cools as the shop does.
+    fn draw(rng: &mut Pcg64Mcg, times_s: &[f64], known: Known) -> Self {
+        let tau_s = between(rng, 1200.0, 7200.0);
+        let sense = if normal(rng) > 0.0 { 1.0 } else { -1.0 };
+        let warm = |t: &f64| (1.0 - (-t / tau_s).exp()) / (1.0 - (-3.0 * HOUR_S / tau_s).exp());
+        let length_mm = between(rng, 100.0, 300.0);
+        match known {
+            Known::Rigid => Self {
+                growth_mm: vec![0.0; times_s.len()],
+                stated: None,
+            },
+            Known::Range => {
+                let range_k = between(rng, 0.1, 1.5);
+                let whole_mm = sense * 11.5e-6 * length_mm * range_k;
+                Self {
+                    growth_mm: times_s.iter().map(|t| whole_mm * warm(t)).collect(),
+                    stated: Some(Artefact {
+                        length_mm,
+                        expansion_per_k: 11.5e-6,
+                        expansion_half_width_per_k: 0.0,
+                        temperature: ArtefactTemperature::Range { range_k },
+                    }),
+                }
+            }
+            Known::Read => {
+                let swing_k = sense * between(rng, 0.1, 3.0);
+                let slow_k = between(rng, 0.0, 0.2);
+                let (period_s, phase) = (between(rng, 2400.0, 14_400.0), between(rng, 0.0, TAU));
+                let slow = |t: &f64| slow_k * (TAU * t / period_s + phase).sin();
+                let degc = times_s.iter().map(|t| 20.0 + swing_k * warm(t) + slow(t));
+                Self::read(rng, times_s, (length_mm, degc.collect()))
+            }
+        }
+    }
+
+    /// Of a length and true temperatures, with a thermometer and a stated coefficient that are off.
+    fn read(rng: &mut Pcg64Mcg, times_s: &[f64], (length_mm, degc): (f64, Vec<f64>)) -> Self {
+        let half_width_k = between(rng, 0.02, 0.2);
+        let expansion_per_k = between(rng, 8e-6, 12.5e-6);
+        let expansion_half_width_per_k = between(rng, 0.3e-6, 1.5e-6);
+        let true_per_k = expansion_per_k + expansion_half_width_per_k * within_limits(rng);
+        let growth_mm = degc.iter().map(|it| true_per_k * length_mm * (it - 20.0));
+        Self {
+            growth_mm: growth_mm.collect(),
+            stated: Some(Artefact {
+                length_mm,
+                expansion_per_k,
+                expansion_half_width_per_k,
+                temperature: ArtefactTemperature::Read {
+                    degc: thermometer(rng, times_s, (half_width_k, &degc)),
+                    half_width_k,
+                    growth_reads: GrowthReads::More,
+                },
+            }),
+        }
+    }
+}
+
+/// What a thermometer reads: off by a constant, and by a wander between knots 20 to 60 min apart.
+fn thermometer(
+    rng: &mut Pcg64Mcg,
+    times_s: &[f64],
+    (half_width_k, degc): (f64, &[f64]),
+) -> Vec<f64> {
+    let constant_k = between(rng, -0.5, 0.5);
+    let every_s = between(rng, 1200.0, 3600.0);
+    let begin = between(rng, 0.0, 1.0);
+    let n = (3.0 * HOUR_S / every_s) as usize + 3;
+    let knots_k: Vec<f64> = (0..n).map(|_| half_width_k * within_limits(rng)).collect();
+    let off_k = |t: f64| {
+        let place = begin + t / every_s;
+        let (k, share) = (place as usize, place.fract());
+        constant_k + (1.0 - share) * knots_k[k] + share * knots_k[k + 1]
+    };
+    { times_s.iter().zip(degc) }
+        .map(|(t, it)| it + off_k(*t))
+        .collect()
 }
 
 fn tested(seed: u64, stated: Stated) -> Vec<Held> {
@@ -87,34 +184,18 @@ fn tested(seed: u64, stated: Stated) -> Vec<Held> {
     let times_s: Vec<f64> = (0..READINGS).map(|k| f64::from(k) * 60.0).collect();
     let standard_mm = UM * between(&mut rng, 0.05, 0.3);
     let wave_mm = UM * between(&mut rng, 3.0, 40.0);
-    let range_k = between(&mut rng, 0.1, 1.5);
-    let length_mm = if stated.mandrel {
-        between(&mut rng, 100.0, 300.0)
-    } else {
-        0.0
-    };
-    // The artefact warms or cools as the shop does, by its whole range.
-    let tau_s = between(&mut rng, 1200.0, 7200.0);
-    let sense = if normal(&mut rng) > 0.0 { 1.0 } else { -1.0 };
-    let warm = |t: f64| (1.0 - (-t / tau_s).exp()) / (1.0 - (-3.0 * HOUR_S / tau_s).exp());
-    let growth_mm: Vec<f64> = times_s
-        .iter()
-        .map(|t| sense * 11.5e-6 * length_mm * range_k * warm(*t))
-        .collect();
+    let mandrel = Mandrel::draw(&mut rng, &times_s, stated.mandrel);
     let truths: Vec<Vec<f64>> = HEIGHTS_MM
         .iter()
         .map(|_| warming(&mut rng, &times_s))
         .collect();
     let channel = |(truth_mm, height_mm): (&Vec<f64>, f64)| {
-        let mut displacements_mm = read(&mut rng, truth_mm, (standard_mm, wave_mm));
-        displacements_mm
-            .iter_mut()
-            .zip(&growth_mm)
-            .for_each(|(x, g)| *x += g);
+        let both = truth_mm.iter().zip(&mandrel.growth_mm);
+        let moved_mm: Vec<f64> = both.map(|(x, growth)| x + growth).collect();
         DriftChannel {
             axis: Axis::X,
             height_mm,
-            displacements_mm,
+            displacements_mm: read(&mut rng, &moved_mm, (standard_mm, wave_mm)),
         }
     };
     let test = DriftTest {
@@ -137,9 +218,7 @@ fn tested(seed: u64, stated: Stated) -> Vec<Held> {
         },
         reading_scatter_mm: (scatters.sum::<f64>() / 2.0).sqrt(),
         sensor_error_period_mm: stated.period.then_some(wave_mm),
-        artefact_length_mm: length_mm,
-        artefact_expansion_per_k: 11.5e-6,
-        artefact_temperature_range_k: range_k,
+        artefact: mandrel.stated,
     };
     held_of(&evaluate(&test, &budget).unwrap(), &times_s, &truths)
 }
@@ -202,19 +281,28 @@ fn found(what: &str, stated: Stated) -> Vec<(&'static str, f64)> {
 fn iso230_3_u_holds_the_drift_and_the_tilt_of_the_machine() {
     let stated = Stated {
         period: true,
-        mandrel: false,
+        mandrel: Known::Rigid,
     };
     hold_clause(&found("ISO 230-3", stated), &[]);
 }
 
 #[test]
-fn iso230_3_u_is_wide_where_the_mandrel_may_grow_at_any_time() {
-    // Its whole range of temperature is a limit for every hour, of which 2 u holds all.
+fn iso230_3_u_holds_the_drift_beside_a_mandrel_that_is_read() {
     let stated = Stated {
         period: true,
-        mandrel: true,
+        mandrel: Known::Read,
     };
-    let wide = ["d", "rate"];
+    hold_clause(&found("ISO 230-3 with a mandrel that is read", stated), &[]);
+}
+
+#[test]
+fn iso230_3_u_is_wide_where_the_mandrel_may_grow_at_any_time() {
+    // It may have grown by its whole range at any time: U is a bound.
+    let stated = Stated {
+        period: true,
+        mandrel: Known::Range,
+    };
+    let wide = ["d", "range", "rate"];
     hold_clause(&found("ISO 230-3 with a mandrel", stated), &wide);
 }
 
@@ -222,7 +310,7 @@ fn iso230_3_u_is_wide_where_the_mandrel_may_grow_at_any_time() {
 fn iso230_3_u_of_a_rate_is_wide_without_the_period_of_the_instruments_error() {
     let stated = Stated {
         period: false,
-        mandrel: false,
+        mandrel: Known::Rigid,
     };
     let wide = ["rate", "rate of B"];
     hold_clause(&found("ISO 230-3 without a period", stated), &wide);
