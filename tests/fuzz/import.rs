@@ -26,6 +26,8 @@ pub mod deviation_names;
 pub mod directions;
 #[path = "../../nodes/abbe/src/import/doubled.rs"]
 pub mod doubled;
+#[path = "../../nodes/abbe/src/import/encoding.rs"]
+pub mod encoding;
 #[path = "../../nodes/abbe/src/import/lacking.rs"]
 pub mod lacking;
 #[path = "../../nodes/abbe/src/import/laser_conditions.rs"]
