@@ -288,15 +288,15 @@ pub(crate) fn import(
 
 /// Puts a table without a date behind what was read before it; whether that was done.
 fn put_behind(map: &mut Map, assumed: &mut Vec<String>, before: Option<Before>) -> bool {
-    const START: &str = "start_s";
-    let is_assumed = assumed.iter().any(|key| key == START);
+    const START_KEY: &str = "start_s";
+    let is_assumed = assumed.iter().any(|key| key == START_KEY);
     let begin_s = before.and_then(|before| begin::after(before, map.start_s, is_assumed));
     let Some(begin_s) = begin_s else {
         return false;
     };
     map.start_s = begin_s;
     if !is_assumed {
-        assumed.push(START.to_owned());
+        assumed.push(START_KEY.to_owned());
     }
     true
 }

@@ -35,7 +35,7 @@ impl Opened {
         let mut last = Last::default();
         for path in paths {
             let Some(source) = Source::of(path)? else {
-                last.add(path, false)?;
+                last.add(path, false);
                 bags.push(path.clone());
                 continue;
             };
@@ -45,11 +45,11 @@ impl Opened {
             };
             let table = match source {
                 Source::Log(log) => {
-                    from_table::of_log(path, &log, map, (Some(machine), last.before(map)))?
+                    from_table::of_log(path, &log, map, (Some(machine), last.before(map)?))?
                 }
-                Source::Table => from_table::of_machine(path, map, (machine, last.before(map)))?,
+                Source::Table => from_table::of_machine(path, map, (machine, last.before(map)?))?,
             };
-            last.add(&table.bag, true)?;
+            last.add(&table.bag, true);
             put_behind.extend(table.is_put_behind.then(|| path.clone()));
             bags.push(table.bag.clone());
             tables.push(table);
@@ -159,25 +159,28 @@ impl Opened {
 /// The end of what was read last.
 #[derive(Default)]
 struct Last {
-    end_s: Option<i64>,
+    bag: Option<PathBuf>,
     is_table: bool,
 }
 
 impl Last {
-    fn add(&mut self, bag: &Path, is_table: bool) -> Result<()> {
-        let times = Bag::open(bag)?.log_times_nanos();
-        let end_s = times.and_then(|(_, end)| i64::try_from(end.div_ceil(1_000_000_000)).ok());
-        self.end_s = end_s.or(self.end_s);
+    fn add(&mut self, bag: &Path, is_table: bool) {
+        self.bag = Some(bag.to_owned());
         self.is_table |= is_table;
-        Ok(())
     }
 
-    fn before(&self, map: Option<&Path>) -> Option<Before> {
+    /// What a table comes after; the bag is opened here, as nothing else asks when it ends.
+    fn before(&self, map: Option<&Path>) -> Result<Option<Before>> {
+        let Some(bag) = &self.bag else {
+            return Ok(None);
+        };
+        let times = Bag::open(bag)?.log_times_nanos();
+        let end_s = times.and_then(|(_, end)| i64::try_from(end.div_ceil(1_000_000_000)).ok());
         let has_same_map = self.is_table && map.is_some();
-        self.end_s.map(|end_s| Before {
+        Ok(end_s.map(|end_s| Before {
             end_s,
             has_same_map,
-        })
+        }))
     }
 }
 

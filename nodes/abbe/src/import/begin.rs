@@ -4,7 +4,8 @@ use super::titles::LEAST_DATE_S;
 
 /// Between the end of a table and the begin of the next one where nobody states it, s: a day, after which a machine is settled.
 pub const PAUSE_S: i64 = 86_400;
-const DAY_S: i64 = 86_400;
+/// Times of the day come again after it, s.
+const WHOLE_DAY_S: i64 = 86_400;
 
 /// What came before a table in one call.
 #[derive(Clone, Copy, Debug)]
@@ -23,8 +24,8 @@ pub fn after(before: Before, start_s: i64, is_assumed: bool) -> Option<i64> {
     }
     let behind_s = before.end_s.saturating_sub(start_s);
     let is_date = start_s as f64 >= LEAST_DATE_S;
-    let days = (behind_s + DAY_S - 1).div_euclid(DAY_S);
-    (!is_date && behind_s > 0).then(|| start_s + days * DAY_S)
+    let days = (behind_s + WHOLE_DAY_S - 1).div_euclid(WHOLE_DAY_S);
+    (!is_date && behind_s > 0).then(|| start_s + days * WHOLE_DAY_S)
 }
 
 #[cfg(test)]
@@ -52,9 +53,19 @@ mod tests {
             (before(dated, false), dated - 3600, false, None),
             // From 8 to 12 h; then from 13 h, and from 8 h.
             (before(43_200, false), 46_800, false, None),
-            (before(43_200, false), 28_800, false, Some(28_800 + DAY_S)),
+            (
+                before(43_200, false),
+                28_800,
+                false,
+                Some(28_800 + WHOLE_DAY_S),
+            ),
             (before(43_200, false), 43_200, false, None),
-            (before(43_201, false), 43_200, false, Some(43_200 + DAY_S)),
+            (
+                before(43_201, false),
+                43_200,
+                false,
+                Some(43_200 + WHOLE_DAY_S),
+            ),
         ] {
             let found = after(before, start_s, is_assumed);
             assert_eq!(found, wanted, "{before:?} {start_s}");
