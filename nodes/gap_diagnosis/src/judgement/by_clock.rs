@@ -29,7 +29,7 @@ use crate::search::nuisance::orthonormal;
 use crate::search::signature::Library;
 
 /// The effect that has no other cause than time.
-const BY_CLOCK: &str = "ambient_drift";
+pub(crate) const BY_CLOCK: &str = "ambient_drift";
 /// What warms or cools the machine, known by a thermometer or by its course in time.
 const HEAT: [&str; 2] = [GROWTH, "coolant"];
 const GROWTH: &str = "spindle_growth";

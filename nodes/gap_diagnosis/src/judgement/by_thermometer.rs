@@ -83,21 +83,24 @@ pub(crate) fn shifts(scope: &Scope<'_, '_>, thermometers: &[Note]) -> Vec<Instan
         .collect()
 }
 
+/// The thermometers that logs go with, those that predict hardly worse included.
+pub(crate) fn goes_with(thermometers: &[Note]) -> impl Iterator<Item = &str> {
+    let found = thermometers.iter().filter_map(|note| match note {
+        Note::GoesWith { found, .. } => Some(found),
+        _ => None,
+    });
+    found.flat_map(|found| found.thermometers().map(String::as_str))
+}
+
 /// Whether an effect is driven by none of the thermometers that the logs go with, so that it is not searched.
 pub(crate) fn is_of_another(stack: &Stack<'_>, instance: &Instance, thermometers: &[Note]) -> bool {
     if !log::is_of_logs(stack) {
         return false;
     }
-    let found = thermometers.iter().filter_map(|note| match note {
-        Note::GoesWith { found, .. } => Some(found),
-        _ => None,
-    });
-    let found = found.flat_map(|found| found.thermometers().map(String::as_str));
-    let mut found = found.peekable();
-    if found.peek().is_none() {
+    let found: BTreeSet<&str> = goes_with(thermometers).collect();
+    if found.is_empty() {
         return false;
     }
-    let found: BTreeSet<&str> = found.collect();
     let own = drivers_of(stack, instance.kind.id, &instance.target);
     let is_driven = DRIVEN.iter().any(|(driven, _)| *driven == instance.kind.id);
     is_driven && !own.is_empty() && own.iter().all(|id| !found.contains(id.as_str()))
@@ -132,25 +135,25 @@ pub(crate) fn hiding(stack: &Stack<'_>, found: &Found) -> Vec<Hiding> {
 }
 
 /// Lists what a search did without with the named members that follow thermometers in its place, where both show the same; whether
-/// there are such members.
+/// there are members that follow thermometers at all.
 pub(crate) fn list_hiding(stack: &Stack<'_>, found: &mut Found, hiding: &[Hiding]) -> bool {
-    let is_one = |member: &Member| member.status() != Status::Surrogate && follows(found, member);
-    let places: Vec<usize> = { found.members.iter().enumerate() }
-        .filter(|(_, member)| is_one(member))
+    let members = found.members.iter().enumerate();
+    let following = members.filter(|(_, member)| follows(found, member));
+    let (shown, named): (Vec<usize>, Vec<usize>) = following
         .map(|(place, _)| place)
-        .collect();
-    for place in &places {
+        .partition(|place| found.members[*place].status() == Status::Surrogate);
+    for place in &named {
         let values = &found.members[*place].estimate.values;
         let own = found.instance(&found.members[*place]).effect(values);
         let own = stack.signature(&*own);
-        for (effect, target, shown) in hiding {
-            let cos = own.dot(shown).abs() / (own.norm() * shown.norm()).max(f64::MIN_POSITIVE);
+        for (effect, target, hidden) in hiding {
+            let cos = own.dot(hidden).abs() / (own.norm() * hidden.norm()).max(f64::MIN_POSITIVE);
             if cos >= MIN_COSINE_HIDDEN {
                 unresolved::list(&mut found.members[*place], effect, target, cos);
             }
         }
     }
-    !places.is_empty()
+    !shown.is_empty() || !named.is_empty()
 }
 
 /// Whether a member follows a thermometer.

@@ -137,14 +137,19 @@ impl Best {
 }
 
 /// Lists with each member what reads the same in such a recording and was not in the search.
-fn list_look_alikes(scope: &Scope<'_, '_>, signatures: &Library, members: &mut [Member]) {
+fn list_look_alikes(
+    scope: &Scope<'_, '_>,
+    signatures: &Library,
+    members: &mut [Member],
+    thermometers: &[Note],
+) {
     let stack = scope.stack;
     unresolved::list_periodic(stack, signatures, members);
     one_feed::list(stack, signatures, members);
     one_plane::list(stack, signatures, members);
     by_clock::list_drift(stack, signatures, members);
     in_course::list(stack, signatures, members, scope.config);
-    other_thermometer::list(stack, signatures, members);
+    other_thermometer::list(stack, signatures, members, thermometers);
     with_heat::list(stack, signatures, members);
 }
 
@@ -164,8 +169,8 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     }
     instances.retain(|own| !by_thermometer::is_driven_by_none(stack, own, &thermometers));
     let mut instead = found_among(scope, instances, &thermometers);
-    let is_named = by_thermometer::list_hiding(stack, &mut instead, &hiding);
-    if is_named { instead } else { found }
+    let has_any = by_thermometer::list_hiding(stack, &mut instead, &hiding);
+    if has_any { instead } else { found }
 }
 
 /// Searches some instances.
@@ -195,7 +200,7 @@ fn found_among(scope: &Scope<'_, '_>, instances: Vec<Instance>, thermometers: &[
     let forms = isolability::forms(&signatures, &normal, &best.set);
     let mut members = veto::judged(scope, &signatures, &normal, &best, &forms, is_closed);
     by_thermometer::check(scope, &signatures, &mut members, thermometers);
-    list_look_alikes(scope, &signatures, &mut members);
+    list_look_alikes(scope, &signatures, &mut members, thermometers);
     resize(stack, &signatures, &normal, &mut members);
     while leave_out_small(stack, &signatures, &mut members) {
         resize(stack, &signatures, &normal, &mut members);

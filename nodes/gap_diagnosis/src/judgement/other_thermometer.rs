@@ -13,6 +13,8 @@
 //! together they are no larger than those of a machine. They may have two signs: a body behind another one follows with
 //! (tau_1 L(tau_1) - tau_2 L(tau_2)) / (tau_1 - tau_2).
 //!
+//! A slow drift follows the clock. With it a thermometer is listed that the log goes with on time that was held out (`thermal`).
+//!
 //! # Holds when
 //! Only logs were read. A thermometer has moved by more than its noise. A body answers with two times at most, and more than two bodies
 //! together imitate nothing.
@@ -24,20 +26,22 @@ use nalgebra::{DMatrix, DVector};
 use twin::Channel;
 use twin::effects::Target;
 
+use crate::judgement::by_clock::BY_CLOCK;
 use crate::judgement::by_thermometer::{self, SHIFT};
 use crate::judgement::cause::Member;
 use crate::judgement::unresolved;
 use crate::judgement::veto::MIN_D_TO_NAME;
 use crate::noise::stack::Stack;
 use crate::report::Status;
+use crate::report::figures::Note;
 use crate::search::nuisance::orthonormal;
 use crate::search::rows::time_s;
 use crate::search::signature::Library;
 use crate::session::log;
 use crate::session::thermal::{MOST_UM_PER_K, moved};
 
-/// Effects that follow thermometers.
-const FOLLOWING: [&str; 3] = ["spindle_growth", "column_bend", SHIFT];
+/// Effects that follow thermometers, and the one that follows the clock.
+const FOLLOWING: [&str; 4] = ["spindle_growth", "column_bend", SHIFT, BY_CLOCK];
 /// Lags that are tried, min.
 const LAGS_OF_OTHERS_MIN: [f64; 11] = [
     0.0, 3.0, 6.0, 12.0, 20.0, 33.0, 55.0, 90.0, 150.0, 250.0, 420.0,
@@ -48,7 +52,12 @@ const MOST_THERMOMETERS: usize = 40;
 const LEAST_OWN: f64 = 1e-9;
 
 /// Lists other thermometers with the members that follow one.
-pub(crate) fn list(stack: &Stack<'_>, signatures: &Library, members: &mut [Member]) {
+pub(crate) fn list(
+    stack: &Stack<'_>,
+    signatures: &Library,
+    members: &mut [Member],
+    thermometers: &[Note],
+) {
     if !log::is_of_logs(stack) {
         return;
     }
@@ -78,8 +87,12 @@ pub(crate) fn list(stack: &Stack<'_>, signatures: &Library, members: &mut [Membe
         let of_own = (&read - &found).norm_squared();
         let of = instance(&members[place]);
         let (id, target) = (of.kind.id, of.target.clone());
+        let is_open = |thermometer: &str| match id {
+            BY_CLOCK => by_thermometer::goes_with(thermometers).any(|own| own == thermometer),
+            _ => !drives(stack, (id, &target), thermometer),
+        };
         for (thermometer, by_axis) in &warming.columns {
-            if drives(stack, (id, &target), thermometer) {
+            if !is_open(thermometer) {
                 continue;
             }
             let mut left = read.clone();

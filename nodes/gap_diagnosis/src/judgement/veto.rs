@@ -33,7 +33,7 @@ use crate::search::nuisance::orthonormal;
 use crate::search::refit::{self, Estimate};
 use crate::search::rows::{Block, count};
 use crate::search::selection::{MOST_CANCELLING, Set};
-use crate::search::signature::{Instance, Library};
+use crate::search::signature::{Instance, Library, OWN_TIME};
 
 /// What speaks against naming an effect that was found.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -257,7 +257,7 @@ fn own_checks(
         });
         let last = [
             above_noise(estimate, stack.freedom().ln()),
-            above_form(stack, raw, scope.config),
+            above_form(stack, raw, scope.config, is_slow(instance)),
             Check::new(CheckId::Sure, relative_u * MIN_SIZE_DEVIATIONS < 1.0)
                 .with(1.0 / relative_u, MIN_SIZE_DEVIATIONS),
         ];
@@ -366,10 +366,19 @@ fn relative_uncertainties(stack: &Stack<'_>, best: &Best) -> Vec<f64> {
 /// A block with fewer stations shows no waves.
 const MIN_STATIONS_OF_WAVES: usize = 24;
 
+/// Kinds of [`OWN_TIME`] that show with the speed of the path, and so jump with it.
+const WITH_SPEED: [&str; 2] = ["clock_drift", "latency_drift"];
+
+/// Whether an effect wanders with time or heat, whatever the path is.
+fn is_slow(instance: &Instance) -> bool {
+    OWN_TIME.contains(&instance.kind.id) && !WITH_SPEED.contains(&instance.kind.id)
+}
+
 /// Whether a signature rises somewhere above the error of form that every simulator has: below it nothing is named,
 /// however often it was measured. What smooth waves over the test do not tell of it (steps, ripple of a screw) is held
-/// against the part of that error which is not smooth either.
-fn above_form(stack: &Stack<'_>, raw: Vec<f64>, config: &GapConfig) -> Check {
+/// against the part of that error which is not smooth either. What wanders with time or heat has no
+/// waves over the path: it is held against all of that error.
+fn above_form(stack: &Stack<'_>, raw: Vec<f64>, config: &GapConfig, is_slow: bool) -> Check {
     let base = FormError::base(config);
     let floated = stack.floated(raw);
     let height = |rows: &[f64]| rows.iter().fold(0.0_f64, |most, row| most.max(row.abs()));
@@ -380,7 +389,7 @@ fn above_form(stack: &Stack<'_>, raw: Vec<f64>, config: &GapConfig) -> Check {
     };
     let blocks = || stack.rows.blocks.iter();
     let mut best = Height::best(blocks().map(plain));
-    if !best.as_ref().is_some_and(Height::is_above) {
+    if !is_slow && !best.as_ref().is_some_and(Height::is_above) {
         let is_path = |block: &&Block| {
             block.channel != Channel::Touch && block.range().len() >= MIN_STATIONS_OF_WAVES
         };

@@ -33,6 +33,8 @@ pub enum Reason {
     /// A reading between two axis states that are no further apart than others, between which the acceleration changes too much for a
     /// path that is known to 0.1 µm.
     TooUneven,
+    /// A reading of a circle on the very point where an axis turns round.
+    OnReversal,
     /// A run with a hole in the axis states while they moved.
     HoleInMotion,
     /// A reading that is further from its nominal value than any machine is.
@@ -87,6 +89,7 @@ impl Reason {
             | Self::WentBack
             | Self::ToldBefore
             | Self::TooUneven
+            | Self::OnReversal
             | Self::RotaryTurned
             | Self::Failed
             | Self::SegmentLate
@@ -106,6 +109,9 @@ impl Reason {
             Self::InGap => "readings lie in holes of the axis states",
             Self::TooUneven => {
                 "readings lie where the acceleration changes too much for the rate of the axis states"
+            }
+            Self::OnReversal => {
+                "readings lie on the point where an axis turns round, before or after its play"
             }
             Self::HoleInMotion => {
                 "runs lack axis states in the midst of their motion and are left out"

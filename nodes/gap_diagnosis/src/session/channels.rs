@@ -26,6 +26,8 @@ const BOW: f64 = 1e-4;
 const OFF_PARABOLA: f64 = 0.008_02;
 /// Rotary axes beyond this are turned, rad.
 const TURNED_RAD: f64 = 1e-6;
+/// A reading of a circle that lies nearer to a point where an axis turns round lies on it.
+const ON_REVERSAL_MM: f64 = 1e-6;
 /// An axis that covers less in what is judged of a run does not move, mm or rad.
 const MOVES: f64 = 1e-2;
 
@@ -165,6 +167,11 @@ impl Scope<'_> {
                 Ok(place) => {
                     let nominal = self.nominal(place, sample.at);
                     let [u, v] = axes.map(|a| nominal[a] - segment.centre_mm[a.index()]);
+                    // A table has rows at 0 and 90 deg, and does not tell on which side of the play they were read.
+                    if u.abs().min(v.abs()) < ON_REVERSAL_MM {
+                        account.note(Reason::OnReversal);
+                        continue;
+                    }
                     series.push(Raw {
                         place,
                         deviation: sample.displacement_mm - u.hypot(v),

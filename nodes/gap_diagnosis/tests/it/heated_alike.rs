@@ -168,3 +168,51 @@ fn a_growth_without_a_thermometer_at_the_spindle_is_listed_with_the_drift() {
         );
     }
 }
+
+/// A Z that goes with its nut, warmed once, of which nobody reads the spindle: readings of the nut are rounded to `step_k`.
+fn warmed_once(minutes: u32, lag_s: f64, (step_k, noise_um): (f64, f64)) -> Diagnosis {
+    let machine = machine(NUT);
+    let mut log = Log::new(&machine, 96);
+    log.segment(1, true, 0.0);
+    for minute in 0..minutes {
+        let at_s = 60.0 * f64::from(minute);
+        let um = 2.0 * lagged_k(8.0, 1800.0, lag_s, at_s) + log.normal(noise_um);
+        let nut = 20.0 + warm_k(8.0, 1800.0, at_s) + log.normal(0.02);
+        log.row(at_s, um, &[("nut_z", (nut / step_k).round() * step_k)]);
+    }
+    log.segment(1, false, 60.0 * f64::from(minutes - 1));
+    log.diagnosed(&machine)
+}
+
+/// A growth by time alone fits a warm-up as well, and is no reason to keep silent about the thermometer that explains it.
+#[test]
+fn a_log_that_goes_with_its_nut_has_the_nut_among_its_causes() {
+    for (minutes, lag_s, read) in [
+        (40, 1.0, (0.01, 0.1)),
+        (60, 1.0, (0.01, 0.1)),
+        (66, 1.0, (0.01, 0.1)),
+        (79, 600.0, (0.01, 0.1)),
+        (180, 1.0, (0.5, 0.2)),
+        (180, 1200.0, (0.5, 0.2)),
+    ] {
+        let diagnosis = warmed_once(minutes, lag_s, read);
+        let causes = named(&diagnosis);
+        let is_of_nut = |cause: &&Cause| {
+            (cause.effect.as_str(), cause.axis.as_str()) == ("thermal_shift", "nut_z")
+                || lists(cause, "thermal_shift", "nut_z")
+        };
+        let causes_of_nut = causes.iter().filter(|cause| is_of_nut(cause)).count();
+        assert_eq!(
+            (causes_of_nut, causes.len()),
+            (1, 1),
+            "{minutes} {lag_s} {read:?}: {:#?}",
+            diagnosis.report.causes
+        );
+    }
+    // Steps of the readings are too much of what is left here to name anything: what is shown is of the nut all the same.
+    let diagnosis = warmed_once(480, 1.0, (0.5, 0.2));
+    let shown: Vec<&str> = { diagnosis.report.causes.iter() }
+        .map(|cause| cause.effect.as_str())
+        .collect();
+    assert!(shown.contains(&"thermal_shift"), "{shown:?}");
+}

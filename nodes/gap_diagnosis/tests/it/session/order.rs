@@ -177,3 +177,23 @@ fn readings_with_the_stamp_of_another_clock_are_of_no_run_and_hold_nobody_up() {
     let (session, _) = builder.finish().expect("a session");
     assert!(session.runs == in_time.runs);
 }
+
+/// Logs and tables begin a run before their first axis state.
+#[test]
+fn the_first_run_of_an_older_bag_is_whole_where_it_begins_before_its_samples() {
+    let mut rig = Rig::new(|_| 0.0);
+    rig.circle(1, 1.0);
+    rig.end(1);
+    rig.builder.next_bag();
+    rig.millis = -86_400_000;
+    rig.segment(1, true);
+    for k in 0..12_567 {
+        let angle = f64::from(k) * 0.025 / 50.0;
+        rig.tick(50.0 * angle.cos(), 50.0 * angle.sin());
+    }
+    rig.end(1);
+    let (session, account) = rig.builder.finish().expect("a session");
+    let numbers: Vec<u32> = session.runs.iter().map(|run| run.segment.run).collect();
+    assert_eq!(numbers, [1, 2]);
+    assert_eq!(account.losses().count(), 0, "{account:?}");
+}

@@ -318,8 +318,12 @@ fn a_scale_that_begins_as_the_machine_warms_is_listed_with_the_screw() {
         let cause = cause.unwrap_or_else(|| panic!("{}", told(&diagnosis)));
         let mut alike = cause.confusable_with.iter();
         let is_screw = |id: &str, axis: &str| (id, axis) == ("screw_elongation", "X");
-        is_screw(&cause.effect, &cause.axis) || alike.any(|own| is_screw(&own.effect, &own.axis))
+        let is_listed = is_screw(&cause.effect, &cause.axis)
+            || alike.any(|own| is_screw(&own.effect, &own.axis));
+        (is_listed, format!("{} {cause:?}", told(&diagnosis)))
     };
-    assert!(listed(120.0), "the machine worked");
-    assert!(!listed(5.0), "the machine stood");
+    let (of_warm, said) = listed(120.0);
+    assert!(of_warm, "the machine worked: {said}");
+    let (of_cold, said) = listed(0.0);
+    assert!(!of_cold, "the machine stood: {said}");
 }
