@@ -288,13 +288,14 @@ fn a_scale_that_begins_as_the_machine_warms_is_listed_with_the_screw() {
     let longer = |s: &State| [60e-6 * s.position[0], 0.0];
     let listed = |speed_mm_s: f64| {
         let mut session = cycles(11, &[&nothing]);
-        for seed in 0..4 {
+        // The plate is mounted anew for each cycle.
+        for mounting in 2..6 {
             work(&mut session, 1800.0);
             go_on(
                 &mut session,
                 &CYCLE,
-                1,
-                1200 + seed,
+                mounting,
+                1200 + u64::from(mounting),
                 Noise::default(),
                 &longer,
             );
