@@ -245,11 +245,7 @@ pub(crate) fn import(
     let remarks = plausible(&map.test, &machine, &runs).with_context(in_table)?;
     runs.remarks.extend(remarks);
     let of_machine = (&machine, machine_text);
-    if output.exists() {
-        let path = output.to_owned();
-        return Err(RecorderError::Exists { path }.into());
-    }
-    let folder = WholeFolder::begin(output)?;
+    let folder = begun(output)?;
     let mut writer = Writer::begin(
         folder.path(),
         of_machine,
@@ -284,6 +280,15 @@ pub(crate) fn import(
         is_put_behind,
         notes,
     })
+}
+
+/// The folder of a bag that is not there yet.
+fn begun(output: &Path) -> Result<WholeFolder> {
+    if output.exists() {
+        let path = output.to_owned();
+        return Err(RecorderError::Exists { path }.into());
+    }
+    WholeFolder::begin(output)
 }
 
 /// Puts a table without a date behind what was read before it; whether that was done.

@@ -92,6 +92,14 @@ fn forget_machine(tests: &mut Tests, has_map: bool) {
     tests.left_out.clear();
 }
 
+/// Reports cells of a table that are no values.
+fn complain_of_odd(table: &Path, n_odd: usize) {
+    if n_odd > 0 {
+        let shown = table.display();
+        complain!("abbe: {shown}: {n_odd} cells hold no value of their column and are left out");
+    }
+}
+
 impl ReportBag {
     /// Evaluates the bag; exit code 3 when a part of it was lost or left out, or a circle has an outlier.
     ///
@@ -111,13 +119,7 @@ impl ReportBag {
             forget_machine(&mut tests, self.map.is_some());
         }
         complain_of(&tests);
-        let n_odd = table.as_ref().map_or(0, |table| table.n_odd);
-        if n_odd > 0 {
-            let shown = self.bag.display();
-            complain!(
-                "abbe: {shown}: {n_odd} cells hold no value of their column and are left out"
-            );
-        }
+        complain_of_odd(&self.bag, table.as_ref().map_or(0, |table| table.n_odd));
         let title = match &table {
             // The folders of a table are no part of its name.
             Some(_) => format!("Tests in the table {}", file_name(&self.bag)),
