@@ -147,8 +147,8 @@ pub fn csv_import(data: &[u8]) {
     let machine = MachineFile::parse(MEASURED, "machine.yaml").expect("the machine of a scenario");
     import::limits::check(&map, &machine).expect("the examples are of this machine");
     let ranges = import::limits::ranges(&map.test, &machine);
-    let text = metrology::text::decode(text, metrology::text::Comments::Csv);
-    let sheet = text.map(|text| import::sheet::Sheet::of_text(&text, map.separator));
+    let text = import::encoding::decode(text);
+    let sheet = text.map(|read| import::sheet::Sheet::of_text(&read.text, map.separator));
     if let Ok(Ok(sheet)) = sheet
         && let Ok(sheet) = import::turned::applied(sheet, map.decimal)
         && let Ok(table) = import::table::Table::of(&sheet, &map, &ranges)

@@ -28,7 +28,11 @@ pub fn read(path: &Path) -> Result<Decoded> {
     decode(&bytes).map_err(|error| anyhow!("{}:{error:#}", path.display()))
 }
 
-fn decode(bytes: &[u8]) -> Result<Decoded> {
+/// The text of some bytes.
+///
+/// # Errors
+/// With line and column of a byte that is no letter.
+pub fn decode(bytes: &[u8]) -> Result<Decoded> {
     let not_utf8 = match text::decode(bytes, Comments::Csv) {
         Ok(text) => return Ok(Decoded { text, note: None }),
         Err(not_utf8) => not_utf8,
