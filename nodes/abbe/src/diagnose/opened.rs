@@ -30,6 +30,7 @@ impl Opened {
     /// # Errors
     /// When a map is named without a table, or a table cannot be imported.
     pub fn of(paths: &[PathBuf], map: Option<&Path>, machine: &Named) -> Result<Self> {
+        refuse_copies(paths)?;
         let (mut bags, mut tables) = (vec![], vec![]);
         let mut put_behind = vec![];
         let mut last = Last::default();
@@ -154,6 +155,31 @@ impl Opened {
             }
         }
     }
+}
+
+/// Refuses a table that is named twice, or copied: put behind itself it would count as a repeat.
+fn refuse_copies(paths: &[PathBuf]) -> Result<()> {
+    let tables: Vec<&PathBuf> = { paths.iter() }
+        .filter(|path| from_table::is_table(path))
+        .collect();
+    for (at, path) in tables.iter().enumerate() {
+        if let Some(other) = tables[..at].iter().find(|other| is_same(path, other)) {
+            bail!(
+                "table {}: is the same as {}, byte for byte: a copy repeats nothing, name each recording once",
+                path.display(),
+                other.display()
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Whether two files hold the same; what cannot be read is another matter.
+fn is_same(one: &Path, other: &Path) -> bool {
+    let length = |path: &Path| std::fs::metadata(path).ok().map(|it| it.len());
+    let bytes = |path: &Path| std::fs::read(path).ok();
+    length(one).is_some_and(|it| Some(it) == length(other))
+        && bytes(one).is_some_and(|it| Some(it) == bytes(other))
 }
 
 /// The end of what was read last.
