@@ -360,7 +360,7 @@ impl FastDds {
         found.unwrap_or_else(|| panic!("{start}: not within {PATIENCE:?}; heard {heard:#?}"))
     }
 
-    /// The first line that begins so and that `pick` takes; `None`: there was none in time.
+    /// The first line with this beginning that `pick` accepts; `None` if none came in time.
     fn in_time(&mut self, start: &str, pick: impl Fn(&str) -> bool) -> Option<String> {
         let deadline = Instant::now() + PATIENCE;
         loop {

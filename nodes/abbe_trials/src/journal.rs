@@ -81,7 +81,7 @@ impl Journal {
     /// Opens or begins one. A last line that was cut short is taken away: its trial is made again.
     ///
     /// # Errors
-    /// When it cannot be read or written, or a line is none of its kinds.
+    /// When it cannot be read or written, or a line is of no known kind.
     pub fn open(path: &Path) -> Result<Self> {
         let place = || format!("journal {}", path.display());
         let bytes = match text_file::bytes(path) {

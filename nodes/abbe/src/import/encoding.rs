@@ -1,7 +1,7 @@
 //! The text of a table in whatever encoding: UTF-8, UTF-16 with a byte order mark, or Windows-1252, which holds Latin-1.
 //!
 //! Old programs write `Position µm` and `Temperatur °C` with one byte a letter. Bytes that are not UTF-8 are therefore taken for
-//! Windows-1252, each by itself: letters of UTF-8 beside them stay. Where a byte is none of its letters, the file is no text.
+//! Windows-1252, each by itself; letters of UTF-8 beside them stay. A byte that Windows-1252 has no letter for makes the file no text.
 
 use std::path::Path;
 
