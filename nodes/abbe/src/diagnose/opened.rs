@@ -242,6 +242,8 @@ impl Source {
 
 #[cfg(test)]
 mod tests {
+    use machine::MachineFile;
+
     use super::*;
 
     #[test]
@@ -254,5 +256,81 @@ mod tests {
         let why = refused(Some(Path::new("map.yaml"))).unwrap().to_string();
         assert!(why.contains("none of the bags is a table"), "{why}");
         assert!(refused(None).is_none());
+    }
+
+    /// What tables of these texts are as one session, and what is said of them.
+    fn read(texts: &[String]) -> (Opened, Named, bags::Recorded) {
+        let home = tempfile::tempdir().unwrap();
+        let path = |k: usize| home.path().join(format!("table_{k}.csv"));
+        for (k, text) in texts.iter().enumerate() {
+            std::fs::write(path(k), text).unwrap();
+        }
+        let paths: Vec<PathBuf> = (0..texts.len()).map(path).collect();
+        let (opened, named) = Opened::without_machine(&paths, None).unwrap();
+        let machine = MachineFile::parse(&named.text, &named.place).unwrap();
+        let recorded = bags::Recorded::read(&opened.bags, &machine).unwrap();
+        (opened, named, recorded)
+    }
+
+    /// A log of ten minutes that begins with `first`, minutes of it as they are written by `time`.
+    fn log(first: &str, time: fn(u32) -> String, from_um: f64) -> String {
+        let row = |minute: u32| format!("{},{}\n", time(minute), from_um + f64::from(minute) * 0.5);
+        format!("{first}time,z_um\n") + &(0..10).map(row).collect::<String>()
+    }
+
+    #[test]
+    fn tables_without_dates_follow_one_another_in_the_order_given_and_lose_nothing() {
+        let seconds: fn(u32) -> String = |minute| (60 * minute).to_string();
+        let of_day: fn(u32) -> String = |minute| format!("08:{minute:02}:00");
+        let dated = "Date: 2026-01-05 08:00\n";
+        for firsts in [
+            [("", seconds), ("", seconds), ("", seconds)],
+            [("", of_day), ("", of_day), ("", of_day)],
+            [(dated, seconds), ("", seconds), ("", of_day)],
+        ] {
+            // Equal files are copies.
+            let of = |k: usize| log(firsts[k].0, firsts[k].1, 0.1 * k as f64);
+            let logs = [of(0), of(1), of(2)];
+            let (opened, _, recorded) = read(&logs);
+            let runs = recorded.bags.iter().map(|bag| (bag.runs, bag.samples));
+            assert_eq!(runs.collect::<Vec<_>>(), [(1, 10); 3]);
+            let said = [recorded.omitted, recorded.remarks].concat();
+            assert!(said.is_empty(), "{said:?}");
+            let lines = opened.warnings();
+            let line = lines.iter().find(|line| line.contains("begin not stated"));
+            let line = line.expect("an assumption");
+            assert_eq!(line.matches("table_").count(), 2, "{line}");
+        }
+        let later = "Date: 2026-01-06 08:00\n";
+        let (opened, ..) = read(&[log(dated, seconds, 0.0), log(later, seconds, 0.1)]);
+        let lines = opened.warnings().join("\n");
+        assert!(!lines.contains("begin not stated"), "{lines}");
+    }
+
+    /// A ballbar's table with rows at 0 and 180 deg, read behind the play of 4 µm of X that is run through there.
+    #[test]
+    fn rows_on_a_reversal_are_no_drift() {
+        let mut text = "run,angle_deg,radial_um\n".to_owned();
+        for run in 1..=5 {
+            for deg in 0..=360 {
+                let (sin, cos) = f64::from(deg).to_radians().sin_cos();
+                let is_back = deg % 360 < 180;
+                let play_um = if is_back { 2.0 } else { -2.0 } * cos;
+                let noise_um = 0.04 * f64::sin(f64::from(7919 * (361 * run + deg)));
+                let um = play_um + 2.0 * sin * cos + noise_um;
+                text.push_str(&format!("{run},{deg},{um:.3}\n"));
+            }
+        }
+        let (opened, machine, recorded) = read(&[text]);
+        let on_reversal = "25 readings lie on the point where an axis turns round";
+        let said = recorded.remarks.join("\n");
+        assert!(said.contains(on_reversal), "{said}");
+        let config = gap_diagnosis::GapConfig::default();
+        let found = super::super::of(&opened.bags, &machine.place, &machine.text, &config).unwrap();
+        let causes = found.diagnosis.report.causes.iter();
+        let named = causes.filter(|cause| cause.status != gap_diagnosis::report::Status::Surrogate);
+        let named: Vec<&str> = named.map(|cause| cause.effect.as_str()).collect();
+        assert!(!named.contains(&"ambient_drift"), "{named:?}");
+        assert!(named.contains(&"backlash"), "{named:?}");
     }
 }
