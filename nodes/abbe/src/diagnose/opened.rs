@@ -258,7 +258,7 @@ mod tests {
         assert!(refused(None).is_none());
     }
 
-    /// What tables of these texts are as one session, and what is said of them.
+    /// Opens tables with these texts as one session; gives their machine and their recording too.
     fn read(texts: &[String]) -> (Opened, Named, bags::Recorded) {
         let home = tempfile::tempdir().unwrap();
         let path = |k: usize| home.path().join(format!("table_{k}.csv"));

@@ -85,7 +85,7 @@ struct Stated {
 /// What is known of the mandrel's growth.
 #[derive(Clone, Copy)]
 enum Known {
-    /// That there is none.
+    /// No mandrel is stated.
     Rigid,
     /// The range of its temperature.
     Range,
