@@ -48,7 +48,9 @@ impl Foreseen {
             return;
         }
         if let Some(diagnosed) = diagnosed {
-            assert_eq!(diagnosed.status.code(), Some(0), "{}", diagnosed.said);
+            // 3: a busy computer left something out, which is named.
+            let is_made = matches!(diagnosed.status.code(), Some(0 | 3));
+            assert!(is_made, "{}", diagnosed.said);
         }
         let text = std::fs::read_to_string(&gap).unwrap();
         let differ = differences(&planned(&foreseen), &serde_json::from_str(&text).unwrap());

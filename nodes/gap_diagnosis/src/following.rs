@@ -17,7 +17,7 @@ pub struct GapDiagnosisConfig {
     /// Runs before the first diagnosis.
     #[schemars(range(min = 2.0, max = 1e4))]
     pub least_runs: usize,
-    /// Runs of one test cycle: the last so many are diagnosed, those before say what noise is.
+    /// Runs of one test cycle: the last so many are also diagnosed by themselves, and those before say what noise is.
     #[schemars(range(min = 1.0, max = 1e4))]
     pub cycle_runs: usize,
     /// Least time between two diagnoses.
@@ -42,7 +42,7 @@ pub struct GapDiagnosisConfig {
 impl Default for GapDiagnosisConfig {
     fn default() -> Self {
         Self {
-            last_runs: 40,
+            last_runs: 200,
             least_runs: 6,
             cycle_runs: 12,
             least_period_s: 5.0,

@@ -9,6 +9,10 @@
 //! then are repeats enough, the noise from before is kept. Until there are enough of any, all runs are diagnosed by
 //! their own repeats.
 //!
+//! A cycle alone does not see what goes with hours, as the warmth of a screw. So all runs are diagnosed beside it, as
+//! `abbe diagnose` does with a bag of them, and that report is the one that is told; but for what the last cycle names
+//! and all runs do not yet: then the cycle's is, for as long as a cycle lasts.
+//!
 //! An effect is told of when it is named and stands well above what can be seen; one that sets in at an instant only where
 //! runs from before say what noise is: else a few runs after any change of the machine look like one. A rest that no effect explains is vaguer: it is told of when a whole cycle
 //! later it is still there.
@@ -55,17 +59,27 @@ pub struct Task {
     session: Session,
     /// The session whose repeats say what noise is, where it is another one.
     quiet: Option<Session>,
+    /// All runs, where `session` has the last cycle alone.
+    whole: Option<Session>,
     gap: GapConfig,
     /// Runs that were closed up to the last that is diagnosed.
     closed: usize,
 }
 
+/// What was found of some runs.
+#[derive(Clone, Debug, PartialEq)]
+struct OfRuns {
+    runs: Vec<u32>,
+    outcome: Result<GapReport, GapError>,
+}
+
 /// A diagnosis that was made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// The runs that it looked at.
-    runs: Vec<u32>,
-    outcome: Result<GapReport, GapError>,
+    /// Of the last cycle, or of all runs where nothing else says what noise is.
+    cycle: OfRuns,
+    /// Of all runs, where the above is of the last cycle.
+    whole: Option<OfRuns>,
     quiet: Option<Session>,
     closed: usize,
 }
@@ -74,12 +88,14 @@ impl Task {
     /// Makes the diagnosis.
     #[must_use]
     pub fn run(self) -> Finding {
-        let runs = self.session.runs.iter().map(|run| run.segment.run);
-        let quiet = self.quiet.as_ref().unwrap_or(&self.session);
-        let found = diagnose_against(&self.machine, &self.session, quiet, &self.gap);
+        let of = |session: &Session, quiet: &Session| OfRuns {
+            runs: session.runs.iter().map(|run| run.segment.run).collect(),
+            outcome: diagnose_against(&self.machine, session, quiet, &self.gap)
+                .map(|found| found.report),
+        };
         Finding {
-            runs: runs.collect(),
-            outcome: found.map(|found| found.report),
+            cycle: of(&self.session, self.quiet.as_ref().unwrap_or(&self.session)),
+            whole: self.whole.as_ref().map(|whole| of(whole, whole)),
             closed: self.closed,
             quiet: self.quiet,
         }
@@ -160,6 +176,8 @@ pub struct GapDiagnosisStage {
     named: BTreeSet<String>,
     /// Effects that were told of, with the interval of their first parameter then.
     told: BTreeMap<String, [f64; 2]>,
+    /// Runs that were closed when the last cycle first named what all runs do not.
+    ahead_since: Option<usize>,
     /// Runs that were closed when the rest that is there was first seen.
     rest_since: Option<usize>,
     had_rest: bool,
@@ -189,6 +207,7 @@ impl GapDiagnosisStage {
             quiet: None,
             named: BTreeSet::new(),
             told: BTreeMap::new(),
+            ahead_since: None,
             rest_since: None,
             had_rest: false,
             remarks: vec![],
@@ -243,6 +262,7 @@ impl GapDiagnosisStage {
             self.builder = builder;
             self.steady_from = 0;
             self.quiet = None;
+            self.ahead_since = None;
             self.rest_since = None;
             self.has_begun_anew = true;
         }
@@ -286,13 +306,16 @@ impl GapDiagnosisStage {
         } else {
             self.quiet.clone()
         };
-        if quiet.is_some() {
+        let mut whole = None;
+        if quiet.is_some() && earlier > 0 {
+            whole = Some(session.clone());
             session.runs.drain(..earlier);
         }
         Task {
             machine: self.machine.clone(),
             session,
             quiet,
+            whole,
             gap: self.gap.clone(),
             closed: self.builder.closed(),
         }
@@ -300,23 +323,51 @@ impl GapDiagnosisStage {
 
     fn found(&mut self, at: Stamp<Host>, finding: Finding, out: &mut Vec<Output>) {
         self.is_out = false;
-        match finding.outcome {
+        let (closed, is_known) = (finding.closed, finding.quiet.is_some());
+        let in_cycle =
+            { finding.cycle.outcome.as_ref().ok() }.map(|report| self.sure(report, is_known));
+        let told = self.told_of(finding.cycle, finding.whole, closed);
+        match told.outcome {
             Ok(report) => {
-                let named = self.named.clone();
-                let is_known = finding.quiet.is_some();
-                self.tell(at, finding.runs, is_known, &report, out);
-                self.look_at_rest(finding.closed, &report, out);
-                if named != self.named {
-                    // Those that were looked at may be of before and after.
-                    self.steady_from = finding.closed;
-                }
+                self.tell(at, told.runs, is_known, &report, out);
+                self.look_at_rest(closed, &report, out);
                 if let Some(quiet) = finding.quiet {
                     self.quiet = Some(quiet);
                 }
             }
             Err(error) => out.push(Output::NotYet(error)),
         }
+        if let Some(named) = in_cycle
+            && named != self.named
+        {
+            self.named = named;
+            // Those that were looked at may be of before and after.
+            self.steady_from = closed;
+        }
         self.tell_left_out(out);
+    }
+
+    /// What is told: of all runs, but for what the last cycle names and they do not, for as long as a cycle lasts.
+    fn told_of(&mut self, cycle: OfRuns, whole: Option<OfRuns>, closed: usize) -> OfRuns {
+        let Some(whole) = whole else {
+            return cycle;
+        };
+        let names = |of: &OfRuns| -> BTreeSet<(String, String)> {
+            let causes = { of.outcome.iter() }.flat_map(|report| &report.causes);
+            let named = causes.filter(|cause| cause.status == Status::Named);
+            let name = |cause: &Cause| (cause.effect.clone(), cause.axis.clone());
+            named.map(name).collect()
+        };
+        if names(&cycle).is_subset(&names(&whole)) {
+            self.ahead_since = None;
+            return if whole.outcome.is_ok() { whole } else { cycle };
+        }
+        let since = *self.ahead_since.get_or_insert(closed);
+        if whole.outcome.is_ok() && closed >= since + self.config.cycle_runs {
+            whole
+        } else {
+            cycle
+        }
     }
 
     fn tell_left_out(&mut self, out: &mut Vec<Output>) {
@@ -337,29 +388,33 @@ impl GapDiagnosisStage {
         out: &mut Vec<Output>,
     ) {
         out.push(Output::Report(Box::new(summary(at, runs, report))));
-        let mut named = BTreeSet::new();
-        let least_confidence = self.config.least_confidence;
-        let is_sure = |cause: &&Cause| {
-            cause.status != Status::Surrogate
-                && cause.confidence >= least_confidence
-                && cause.d >= MIN_D_OF_CHANGE
-                && (is_known || cause.parameters.iter().all(|p| p.name != INSTANT))
-        };
-        let sure = report.causes.iter().filter(is_sure);
-        for cause in sure {
-            let effect = format!("{} {}", cause.effect, cause.axis);
-            let effect = effect.trim_end().to_owned();
+        let sure = { report.causes.iter() }.filter(|cause| self.is_sure(cause, is_known));
+        for cause in sure.collect::<Vec<&Cause>>() {
+            let effect = named(cause);
             if self.is_news(&effect, cause) {
                 out.push(Output::NewEffect {
-                    effect: effect.clone(),
+                    effect,
                     besides: rivals(cause),
                     size: size(cause),
                     confidence: cause.confidence,
                 });
             }
-            named.insert(effect);
         }
-        self.named = named;
+    }
+
+    /// Whether a cause stands well above what can be seen.
+    fn is_sure(&self, cause: &Cause, is_known: bool) -> bool {
+        cause.status != Status::Surrogate
+            && cause.confidence >= self.config.least_confidence
+            && cause.d >= MIN_D_OF_CHANGE
+            && (is_known || cause.parameters.iter().all(|p| p.name != INSTANT))
+    }
+
+    /// The sure causes of a report, by name.
+    fn sure(&self, report: &GapReport, is_known: bool) -> BTreeSet<String> {
+        let causes = report.causes.iter();
+        let sure = causes.filter(|cause| self.is_sure(cause, is_known));
+        sure.map(named).collect()
     }
 
     /// Whether an effect was never told of, or has another size than when it was: one at the edge of what can be seen
@@ -390,6 +445,12 @@ impl GapDiagnosisStage {
             });
         }
     }
+}
+
+/// An effect with what it acts on.
+fn named(cause: &Cause) -> String {
+    let name = format!("{} {}", cause.effect, cause.axis);
+    name.trim_end().to_owned()
 }
 
 /// What these runs cannot tell from a cause, in words behind its name.

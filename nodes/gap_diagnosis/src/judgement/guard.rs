@@ -34,7 +34,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::DVector;
-use twin::Channel;
+use twin::{Channel, Session};
 
 use crate::config::GapConfig;
 use crate::judgement::{Check, CheckId};
@@ -370,7 +370,7 @@ fn shared_by_repeats(
                 continue;
             };
             let sum = sums.entry(one.channel.clone()).or_default();
-            for (here, there) in same_stations(one, other) {
+            for (here, there) in shared_rows(stack.session, one, other) {
                 sum[0] += clipped(rest[here], *s2) * clipped(rest[there], *s2);
                 sum[1] += 1.0;
             }
@@ -382,19 +382,13 @@ fn shared_by_repeats(
         .collect()
 }
 
-/// Places in the stack of the stations that two blocks both have.
-fn same_stations(one: &Block, other: &Block) -> Vec<(usize, usize)> {
-    let mut pairs = Vec::new();
-    let mut at = other.rows.iter().zip(other.range()).peekable();
-    for (row, here) in one.rows.iter().zip(one.range()) {
-        while at.next_if(|(next, _)| next.station < row.station).is_some() {}
-        if let Some((next, there)) = at.peek()
-            && next.station == row.station
-        {
-            pairs.push((here, *there));
-        }
-    }
-    pairs
+/// Places in the stack of the rows that two blocks both have.
+fn shared_rows(session: &Session, one: &Block, other: &Block) -> Vec<(usize, usize)> {
+    let shared = repeats::shared(session, &[one, other]);
+    let (here, there) = (shared[0].iter(), shared[1].iter());
+    here.zip(there)
+        .map(|(a, b)| (one.start + a, other.start + b))
+        .collect()
 }
 
 #[cfg(test)]

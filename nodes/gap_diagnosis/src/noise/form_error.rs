@@ -198,10 +198,13 @@ pub fn sharing(session: &Session, rows: &Rows) -> Vec<f64> {
 
 /// Groups of repeats with the same rows.
 pub fn alike(session: &Session, rows: &Rows) -> Vec<Vec<usize>> {
-    let stations = |block: usize| rows.blocks[block].rows.iter().map(|row| row.station);
     let is_alike = |group: &Vec<usize>| {
-        let mut others = group.iter().skip(1);
-        group.len() > 1 && others.all(|other| stations(*other).eq(stations(group[0])))
+        let blocks: Vec<&Block> = group.iter().map(|block| &rows.blocks[*block]).collect();
+        let shared = repeats::shared(session, &blocks);
+        let mut each = blocks.iter().zip(&shared);
+        let all =
+            |(block, own): (&&Block, &Vec<usize>)| own.iter().copied().eq(0..block.rows.len());
+        group.len() > 1 && each.all(all)
     };
     let groups = repeats::groups(session, rows).into_iter();
     groups.filter(is_alike).collect()

@@ -22,14 +22,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use metrology::{Axis, PerAxis};
+use metrology::PerAxis;
 use nalgebra::DVector;
-use twin::{Channel, Run, Session, Touch};
+use twin::{Channel, Run, Session};
 
 use crate::noise::joins::Joins;
 use crate::search::nuisance::orthonormal;
 use crate::search::rows::{Block, Row, Rows, Station, count, position, time_s};
 use crate::session::log;
+
+mod touches;
+
+pub use touches::{Label, label};
 
 /// Differences of one group of repeats.
 #[derive(Clone, Debug)]
@@ -83,18 +87,22 @@ const POSE_RAD: f64 = 0.01;
 pub fn is_repeat(session: &Session, a: &Block, b: &Block) -> bool {
     let (one, other) = (&session.runs[a.run], &session.runs[b.run]);
     let is_same = a.channel == b.channel && same_condition(one, other);
-    a.run != b.run && is_same && log::heats_alike(session, a, b) && {
-        let (from, to) = (extent(one, a), extent(other, b));
-        one.motion.axes.iter().all(|axis| {
-            let reach = if axis.is_linear() {
-                0.2 + 0.02 * (from[axis].1 - from[axis].0)
-            } else {
-                POSE_RAD
-            };
-            let near = |p: f64, q: f64| (p - q).abs() < reach;
-            near(from[axis].0, to[axis].0) && near(from[axis].1, to[axis].1)
-        })
+    if a.run == b.run || !is_same || !log::heats_alike(session, a, b) {
+        return false;
     }
+    if a.channel == Channel::Touch {
+        return touches::are_repeated(session, a, b);
+    }
+    let (from, to) = (extent(one, a), extent(other, b));
+    one.motion.axes.iter().all(|axis| {
+        let reach = if axis.is_linear() {
+            0.2 + 0.02 * (from[axis].1 - from[axis].0)
+        } else {
+            POSE_RAD
+        };
+        let near = |p: f64, q: f64| (p - q).abs() < reach;
+        near(from[axis].0, to[axis].0) && near(from[axis].1, to[axis].1)
+    })
 }
 
 /// Whether two runs are one test under one condition.
@@ -138,7 +146,7 @@ fn between(
         found.push(contrasts);
     } else if blocks[0].channel == Channel::Touch {
         for (place, block) in group.iter().zip(blocks) {
-            found.extend(touches_between(
+            found.extend(touches::between(
                 &session.runs[block.run],
                 *place,
                 block,
@@ -147,6 +155,25 @@ fn between(
         }
     }
     found
+}
+
+/// The rows that all blocks have, by block; touches are one where they meet the same place alike, whatever each run lacks.
+pub fn shared(session: &Session, blocks: &[&Block]) -> Vec<Vec<usize>> {
+    if blocks[0].channel == Channel::Touch {
+        return touches::shared(session, blocks);
+    }
+    let stations =
+        |block: &Block| -> BTreeSet<Station> { block.rows.iter().map(|row| row.station).collect() };
+    let mut shared = stations(blocks[0]);
+    for block in &blocks[1..] {
+        shared = &shared & &stations(block);
+    }
+    let of = |block: &&Block| -> Vec<usize> {
+        (0..block.rows.len())
+            .filter(|k| shared.contains(&block.rows[*k].station))
+            .collect()
+    };
+    blocks.iter().map(of).collect()
 }
 
 fn runs_between(
@@ -162,21 +189,10 @@ fn runs_between(
     if log::is_log(&session.runs[blocks[0].run]) {
         return log_between(session, group, blocks, residual);
     }
-    let stations =
-        |block: &Block| -> BTreeSet<Station> { block.rows.iter().map(|row| row.station).collect() };
-    let mut shared = stations(blocks[0]);
-    for block in &blocks[1..] {
-        shared = &shared & &stations(block);
-    }
-    if shared.is_empty() || 2 * shared.len() < blocks[0].rows.len() {
+    let places = shared(session, blocks);
+    if places[0].is_empty() || 2 * places[0].len() < blocks[0].rows.len() {
         return None;
     }
-    let of = |block: &Block| -> Vec<usize> {
-        (0..block.rows.len())
-            .filter(|k| shared.contains(&block.rows[*k].station))
-            .collect()
-    };
-    let places: Vec<Vec<usize>> = blocks.iter().map(|block| of(block)).collect();
     let times: Vec<f64> = blocks
         .iter()
         .map(|block| time_s(&session.runs[block.run], &block.rows[0]))
@@ -185,7 +201,7 @@ fn runs_between(
     let values: Vec<Vec<f64>> = weights_beside(&times, &runs, steps)
         .iter()
         .map(|weight| {
-            (0..shared.len())
+            (0..places[0].len())
                 .map(|row| {
                     let part = |i: usize| weight[i] * residual[blocks[i].start + places[i][row]];
                     (0..blocks.len()).map(part).sum()
@@ -287,58 +303,6 @@ fn weights_beside(times: &[f64], runs: &[usize], steps: &[usize]) -> Vec<DVector
     let basis = orthonormal(n, own.chain(unit));
     (taken.ncols()..basis.ncols())
         .map(|k| basis.column(k).into_owned())
-        .collect()
-}
-
-/// What touches that repeat each other have in common.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Label {
-    feature: String,
-    /// Directions in hundredths, the feed in hundredths of mm/s.
-    approach: [i64; 4],
-    /// Of the rotary axes, in hundredths of a radian.
-    pose: Vec<i64>,
-}
-
-/// Feature, approach, feed and pose of a touch.
-pub fn label(touch: &Touch) -> Label {
-    #[expect(clippy::cast_possible_truncation, reason = "a label, rounded")]
-    let rounded = |value: f64| (value * 100.0).round() as i64;
-    let a = touch.approach;
-    let pose = Axis::ROTARY.map(|axis| rounded(touch.position[axis]));
-    Label {
-        feature: touch.feature_id.clone(),
-        approach: [a.x, a.y, a.z, touch.feed_mm_s].map(rounded),
-        pose: pose.to_vec(),
-    }
-}
-
-/// Touches of one feature, approach, feed and pose within a run.
-fn touches_between(run: &Run, place: usize, block: &Block, residual: &[f64]) -> Vec<Contrasts> {
-    let mut same = BTreeMap::<Label, Vec<usize>>::new();
-    for (index, row) in block.rows.iter().enumerate() {
-        if let Some(touch) = row.touch.and_then(|touch| run.touches.get(touch)) {
-            same.entry(label(touch)).or_default().push(index);
-        }
-    }
-    let contrast = |rows: Vec<usize>| {
-        let times: Vec<f64> = rows.iter().map(|k| time_s(run, &block.rows[*k])).collect();
-        let of = |weight: &DVector<f64>| {
-            let parts = rows.iter().zip(weight.iter());
-            vec![parts.map(|(k, w)| w * residual[block.start + k]).sum()]
-        };
-        let values = weights(&times).iter().map(of).collect();
-        Contrasts {
-            blocks: vec![place],
-            rows: vec![rows[0]],
-            values,
-            one_zero: false,
-            joins: None,
-        }
-    };
-    same.into_values()
-        .filter(|rows| rows.len() > 1)
-        .map(contrast)
         .collect()
 }
 

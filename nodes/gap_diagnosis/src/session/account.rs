@@ -26,6 +26,8 @@ pub enum Reason {
     WentBack,
     /// A touch that was told again, or after a later one.
     ToldBefore,
+    /// A touch whose number is left out between two of one run.
+    TouchMissing,
     /// The recording's clock jumped back by more than two seconds, or ahead by more than a week.
     ClockJump,
     /// A reading between two axis states that lie too far apart.
@@ -81,6 +83,7 @@ impl Reason {
             | Self::Stuck
             | Self::StuckInPart
             | Self::UnknownFeature
+            | Self::TouchMissing
             | Self::Cut
             | Self::NotBegun
             | Self::TooLong
@@ -105,6 +108,9 @@ impl Reason {
             Self::OtherMachine => "axis states were of another machine",
             Self::WentBack => "samples were older than one before them",
             Self::ToldBefore => "touches were told before, or a later one before them",
+            Self::TouchMissing => {
+                "touches are not in the recording, as the numbers of those before and after say"
+            }
             Self::ClockJump => "times the clock jumped back, or ahead by more than a week",
             Self::InGap => "readings lie in holes of the axis states",
             Self::TooUneven => {

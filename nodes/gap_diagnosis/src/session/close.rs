@@ -105,6 +105,8 @@ impl SessionBuilder {
     /// Touches with their deviation (4); faces of blocks where there are none.
     fn touches(&mut self, open: &Record, motion: &Motion) -> Vec<(Touch, f64)> {
         let mut touches = vec![];
+        self.account
+            .note_many(Reason::TouchMissing, missing(&open.triggers));
         for (time_s, trigger) in &open.triggers {
             let beyond = self.beyond(&trigger.feature_id, &trigger.latched, &trigger.approach);
             let Some(deviation) = beyond else {
@@ -210,6 +212,14 @@ fn as_approached(touches: &[(Touch, f64)], motion: &mut Motion) {
             motion.acceleration[axis][tick] = motion.acceleration[axis][before];
         }
     }
+}
+
+/// How many numbers are left out between the touches of one run.
+fn missing(triggers: &[(f64, ProbeTrigger)]) -> usize {
+    let numbers = triggers.iter().map(|(_, trigger)| trigger.sequence);
+    let pairs = numbers.clone().zip(numbers.skip(1));
+    let between = pairs.map(|(before, after)| after.saturating_sub(before).saturating_sub(1));
+    between.map(|lacking| lacking as usize).sum()
 }
 
 /// Tick nearest to a touch, by the controller's clock.

@@ -1,7 +1,9 @@
 //! Topics that do not arrive in the order of their stamps.
 
-use gap_diagnosis::session::{Input, SessionBuilder, SessionConfig};
-use metrology::sample::{GridSample, TemperatureSample, TestKind, TestPlane, TestSegment};
+use gap_diagnosis::session::{Input, Reason, SessionBuilder, SessionConfig};
+use metrology::sample::{
+    GridSample, ProbeTrigger, TemperatureSample, TestKind, TestPlane, TestSegment,
+};
 use metrology::{Axis, PerAxis, Stamp};
 use twin::{Channel, Run, Session};
 
@@ -196,4 +198,33 @@ fn the_first_run_of_an_older_bag_is_whole_where_it_begins_before_its_samples() {
     let numbers: Vec<u32> = session.runs.iter().map(|run| run.segment.run).collect();
     assert_eq!(numbers, [1, 2]);
     assert_eq!(account.losses().count(), 0, "{account:?}");
+}
+
+#[test]
+fn touches_whose_numbers_are_left_out_within_a_run_are_counted_as_lost() {
+    for (numbers, lost) in [
+        (vec![4, 5, 6], 0),
+        (vec![0, 1], 0),
+        (vec![4, 5, 7], 1),
+        (vec![3, 6, 9], 4),
+    ] {
+        let mut rig = Rig::new(|_| 0.0);
+        let at = |millis: i64| Stamp::from_nanos(millis * 1_000_000);
+        let segment = |begin, millis| TestSegment {
+            at: at(millis),
+            ..segment(1, begin, TestKind::Latency)
+        };
+        rig.builder.take(Input::Segment(segment(true, 0)));
+        for (k, number) in (1..).zip(numbers) {
+            let touch = touch(100 * k, "block_1.x");
+            rig.builder.take(Input::Trigger(ProbeTrigger {
+                sequence: number,
+                ..touch
+            }));
+        }
+        rig.builder.take(Input::Segment(segment(false, 1000)));
+        let (_, account) = rig.builder.finish().expect("a session");
+        assert_eq!(account.count(Reason::TouchMissing), lost, "{account:?}");
+        assert_eq!(account.losses().count(), usize::from(lost > 0));
+    }
 }
