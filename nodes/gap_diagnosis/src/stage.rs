@@ -11,7 +11,7 @@
 //!
 //! A cycle alone does not see what goes with hours, as the warmth of a screw. So all runs are diagnosed beside it, as
 //! `abbe diagnose` does with a bag of them, and that report is the one that is told; but for what the last cycle names
-//! and all runs do not yet: then the cycle's is, for as long as a cycle lasts.
+//! and all runs do not yet: then the cycle's is, for as long as a cycle lasts. So it is where a size is another one now.
 //!
 //! An effect is told of when it is named and stands well above what can be seen; one that sets in at an instant only where
 //! runs from before say what noise is: else a few runs after any change of the machine look like one. A rest that no effect explains is vaguer: it is told of when a whole cycle
@@ -24,7 +24,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use machine::MachineFile;
-use metrology::sample::{GapCause, GapParameter, GapStatus, GapSummary};
+use metrology::sample::GapSummary;
 use metrology::stamp::Span;
 use metrology::{Host, Stage, Stamp};
 use twin::{Run, Session};
@@ -36,6 +36,11 @@ use crate::following::GapDiagnosisConfig;
 use crate::noise::repeats::same_condition;
 use crate::report::{Cause, GapReport, Status};
 use crate::session::{self, SessionBuilder, SessionConfig, SessionError};
+
+mod told;
+
+pub use told::summary;
+use told::{interval, is_same, named, new_effect, sizes_meet};
 
 /// What the node is told.
 #[derive(Clone, Debug, PartialEq)]
@@ -324,12 +329,15 @@ impl GapDiagnosisStage {
     fn found(&mut self, at: Stamp<Host>, finding: Finding, out: &mut Vec<Output>) {
         self.is_out = false;
         let (closed, is_known) = (finding.closed, finding.quiet.is_some());
-        let in_cycle =
-            { finding.cycle.outcome.as_ref().ok() }.map(|report| self.sure(report, is_known));
+        let cycle = finding.cycle.outcome.as_ref().ok().cloned();
         let told = self.told_of(finding.cycle, finding.whole, closed);
         match told.outcome {
             Ok(report) => {
-                self.tell(at, told.runs, is_known, &report, out);
+                out.push(Output::Report(Box::new(summary(at, told.runs, &report))));
+                if let Some(cycle) = &cycle {
+                    self.tell_of_cycle(cycle, is_known, closed, out);
+                }
+                self.tell_first(&report, is_known, out);
                 self.look_at_rest(closed, &report, out);
                 if let Some(quiet) = finding.quiet {
                     self.quiet = Some(quiet);
@@ -337,33 +345,37 @@ impl GapDiagnosisStage {
             }
             Err(error) => out.push(Output::NotYet(error)),
         }
-        if let Some(named) = in_cycle
-            && named != self.named
-        {
-            self.named = named;
-            // Those that were looked at may be of before and after.
-            self.steady_from = closed;
-        }
         self.tell_left_out(out);
     }
 
-    /// What is told: of all runs, but for what the last cycle names and they do not, for as long as a cycle lasts.
+    /// What is told: of all runs, but for what the last cycle names and they do not, for as long as a cycle lasts. What has
+    /// another size than over all runs has that of the cycle.
     fn told_of(&mut self, cycle: OfRuns, whole: Option<OfRuns>, closed: usize) -> OfRuns {
         let Some(whole) = whole else {
             return cycle;
         };
-        let names = |of: &OfRuns| -> BTreeSet<(String, String)> {
-            let causes = { of.outcome.iter() }.flat_map(|report| &report.causes);
-            let named = causes.filter(|cause| cause.status == Status::Named);
-            let name = |cause: &Cause| (cause.effect.clone(), cause.axis.clone());
-            named.map(name).collect()
-        };
-        if names(&cycle).is_subset(&names(&whole)) {
-            self.ahead_since = None;
+        let (Ok(of_cycle), Ok(of_all)) = (&cycle.outcome, &whole.outcome) else {
             return if whole.outcome.is_ok() { whole } else { cycle };
+        };
+        let named = |report: &'_ GapReport| -> Vec<Cause> {
+            let causes = report.causes.iter();
+            let named = causes.filter(|cause| cause.status == Status::Named);
+            named.cloned().collect()
+        };
+        let (now, all) = (named(of_cycle), named(of_all));
+        let in_all = |cause: &Cause| all.iter().find(|other| is_same(other, cause));
+        if now.iter().all(|cause| in_all(cause).is_some()) {
+            self.ahead_since = None;
+            let has_size =
+                |cause: &Cause| in_all(cause).is_some_and(|other| sizes_meet(other, cause));
+            return if now.iter().all(has_size) {
+                whole
+            } else {
+                cycle
+            };
         }
         let since = *self.ahead_since.get_or_insert(closed);
-        if whole.outcome.is_ok() && closed >= since + self.config.cycle_runs {
+        if closed >= since + self.config.cycle_runs {
             whole
         } else {
             cycle
@@ -378,26 +390,35 @@ impl GapDiagnosisStage {
         }
     }
 
-    /// What is sure and new; `is_known` where runs from before say what noise is.
-    fn tell(
+    /// What is sure and new of the last cycle; `is_known` where runs from before say what noise is.
+    fn tell_of_cycle(
         &mut self,
-        at: Stamp<Host>,
-        runs: Vec<u32>,
-        is_known: bool,
         report: &GapReport,
+        is_known: bool,
+        closed: usize,
         out: &mut Vec<Output>,
     ) {
-        out.push(Output::Report(Box::new(summary(at, runs, report))));
         let sure = { report.causes.iter() }.filter(|cause| self.is_sure(cause, is_known));
-        for cause in sure.collect::<Vec<&Cause>>() {
-            let effect = named(cause);
-            if self.is_news(&effect, cause) {
-                out.push(Output::NewEffect {
-                    effect,
-                    besides: rivals(cause),
-                    size: size(cause),
-                    confidence: cause.confidence,
-                });
+        let sure: Vec<&Cause> = sure.collect();
+        for cause in &sure {
+            if self.is_news(cause) {
+                out.push(new_effect(cause));
+            }
+        }
+        let named: BTreeSet<String> = sure.into_iter().map(named).collect();
+        if named != self.named {
+            self.named = named;
+            // Those that were looked at may be of before and after.
+            self.steady_from = closed;
+        }
+    }
+
+    /// What is sure of all runs and was never told of.
+    fn tell_first(&mut self, report: &GapReport, is_known: bool, out: &mut Vec<Output>) {
+        for cause in &report.causes {
+            let is_first = !self.told.contains_key(&named(cause));
+            if is_first && self.is_sure(cause, is_known) && self.is_news(cause) {
+                out.push(new_effect(cause));
             }
         }
     }
@@ -410,22 +431,15 @@ impl GapDiagnosisStage {
             && (is_known || cause.parameters.iter().all(|p| p.name != INSTANT))
     }
 
-    /// The sure causes of a report, by name.
-    fn sure(&self, report: &GapReport, is_known: bool) -> BTreeSet<String> {
-        let causes = report.causes.iter();
-        let sure = causes.filter(|cause| self.is_sure(cause, is_known));
-        sure.map(named).collect()
-    }
-
     /// Whether an effect was never told of, or has another size than when it was: one at the edge of what can be seen
     /// comes and goes from diagnosis to diagnosis.
-    fn is_news(&mut self, effect: &str, cause: &Cause) -> bool {
-        let parameter = cause.parameters.first();
-        let now = parameter.map_or([0.0; 2], |p| [p.low, p.high]);
-        let before = self.told.get(effect);
+    fn is_news(&mut self, cause: &Cause) -> bool {
+        let now = interval(cause);
+        let effect = named(cause);
+        let before = self.told.get(&effect);
         let is_news = before.is_none_or(|[low, high]| now[0] > *high || now[1] < *low);
         if is_news {
-            self.told.insert(effect.to_owned(), now);
+            self.told.insert(effect, now);
         }
         is_news
     }
@@ -444,94 +458,6 @@ impl GapDiagnosisStage {
                 covariate: report.unknown.description.covariate.clone(),
             });
         }
-    }
-}
-
-/// An effect with what it acts on.
-fn named(cause: &Cause) -> String {
-    let name = format!("{} {}", cause.effect, cause.axis);
-    name.trim_end().to_owned()
-}
-
-/// What these runs cannot tell from a cause, in words behind its name.
-fn rivals(cause: &Cause) -> String {
-    let open = { cause.confusable_with.iter() }.filter(|other| !other.excluded);
-    let names: Vec<String> = open
-        .map(|other| {
-            format!("{} {}", other.effect, other.axis)
-                .trim_end()
-                .to_owned()
-        })
-        .collect();
-    if cause.status != Status::Set || names.is_empty() {
-        return String::new();
-    }
-    format!(
-        " (or {}, which these runs cannot tell from it)",
-        names.join(", ")
-    )
-}
-
-fn size(cause: &Cause) -> String {
-    let parameters = cause.parameters.iter();
-    let words = parameters.map(|p| {
-        format!(
-            "{} = {:.2} ({:.2} to {:.2})",
-            p.name, p.value, p.low, p.high
-        )
-    });
-    words.collect::<Vec<_>>().join(", ")
-}
-
-/// The report as it is published.
-#[must_use]
-pub fn summary(at: Stamp<Host>, runs: Vec<u32>, report: &GapReport) -> GapSummary {
-    let mm = |um: f64| um * 1e-3;
-    let or_nan = |um: Option<f64>| um.map_or(f64::NAN, mm);
-    GapSummary {
-        at,
-        runs,
-        rms_mm: mm(report.gap.rms_um),
-        p95_mm: mm(report.gap.p95_um),
-        floor_mm: mm(report.gap.floor_um),
-        above_floor: report.gap.above_floor,
-        causes: report.causes.iter().map(cause).collect(),
-        has_unknown: report.unknown.flagged,
-        unknown_covariate: report.unknown.description.covariate.clone(),
-        held_out_runs: report.shrink.held_out_runs.clone(),
-        rms_before_mm: or_nan(report.shrink.rms_um.before),
-        rms_after_mm: or_nan(report.shrink.rms_um.after),
-        gap_closed: report
-            .shrink
-            .gap_closed
-            .map_or(f64::NAN, |closed| closed.value),
-        next_experiment: report
-            .next_experiments
-            .first()
-            .map_or_else(String::new, |next| next.run.clone()),
-        json: serde_json::to_string(report)
-            .expect("a report has no map with keys that are no text"),
-    }
-}
-
-fn cause(cause: &Cause) -> GapCause {
-    let parameters = cause.parameters.iter().map(|p| GapParameter {
-        name: p.name.clone(),
-        value: p.value,
-        low: p.low,
-        high: p.high,
-    });
-    GapCause {
-        effect: cause.effect.clone(),
-        axis: cause.axis.clone(),
-        status: match cause.status {
-            Status::Named => GapStatus::Named,
-            Status::Surrogate => GapStatus::Surrogate,
-            Status::Set => GapStatus::Set,
-        },
-        confidence: cause.confidence,
-        whitened_size: cause.d,
-        parameters: parameters.collect(),
     }
 }
 
