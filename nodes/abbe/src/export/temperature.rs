@@ -112,7 +112,7 @@ environmental_drift_um: 0.0
         }
         let unread = BUDGET.replace("temperature_deviation_k: 2.0", "thermometers: [bed]");
         let unread = said(Some(&unread));
-        let words = "names the thermometer bed, which has no reading during this test): right at";
+        let words = "names the thermometer bed, which has no reading during this test; no thermometer was read): right at";
         assert!(unread.contains(words), "{unread}");
         let own = format!("{BUDGET}length_corrected_by_instrument: true\n");
         let own = said(Some(&own));

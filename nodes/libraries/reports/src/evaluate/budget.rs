@@ -251,9 +251,7 @@ impl Body {
         }
         let mut all = Vec::new();
         for name in &self.thermometers {
-            let silent =
-                || format!("names the thermometer {name}, which has no reading during this test");
-            let readings = read.get(name).ok_or_else(silent)?;
+            let readings = read.get(name).ok_or_else(|| silent(name, read))?;
             check_range(name, readings, "temperature_deviation_k")?;
             all.push(readings);
         }
@@ -318,6 +316,17 @@ impl Body {
             expansion_half_width_per_k: self.expansion_half_width_um_per_m_k * 1e-6,
         }
     }
+}
+
+/// Why a thermometer that a budget names tells nothing of a test.
+fn silent(name: &str, read: &Thermometers) -> String {
+    let names: Vec<&str> = read.keys().map(String::as_str).collect();
+    let read = if names.is_empty() {
+        "no thermometer was read".to_owned()
+    } else {
+        format!("read were {}", names.join(", "))
+    };
+    format!("names the thermometer {name}, which has no reading during this test; {read}")
 }
 
 /// Refuses a thermometer that stopped to measure, or reads what no budget may state; `key` would state its body's temperature.

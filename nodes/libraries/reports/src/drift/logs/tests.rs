@@ -160,6 +160,15 @@ fn a_thermometer_that_stops_before_the_log_ends_leaves_the_growth_in_the_drift()
 }
 
 #[test]
+fn a_thermometer_that_was_not_read_is_named_with_those_that_were() {
+    let unread = READ.replace("[top]", "[end]");
+    let section = part(Axis::Z, |h| 2e-3 * warm_k(h), (&unread, 4.0));
+    assert_eq!(warnings(&section), ["Growth of the mandrel not taken out"]);
+    let words = "names the thermometer end, which has no reading during this test; read were top";
+    assert!(section.terminal().contains(words), "{}", section.terminal());
+}
+
+#[test]
 fn a_range_of_the_temperature_is_a_bound_by_hand_and_x_has_no_mandrel_along_it() {
     let range = "mandrel: {length_mm: 200.0, expansion_um_per_m_k: 10.0, temperature_range_k: 3.0}";
     let grown = |h: f64| 2e-3 * warm_k(h);

@@ -10,7 +10,7 @@ use serde::Deserialize;
 
 use super::super::drift::Series;
 use super::super::test_conditions::Thermometers;
-use super::{Budget, check_range, statement};
+use super::{Budget, check_range, silent, statement};
 
 /// Longest time at either end of a log for which the nearest reading of a thermometer counts.
 const LONGEST_AT_END: Span = Span::from_nanos(600_000_000_000);
@@ -59,8 +59,7 @@ impl Meanwhile<'_> {
     /// # Errors
     /// Why they do not cover the instants.
     fn degc(&self, name: &str) -> Result<Vec<f64>, String> {
-        let silent =
-            || format!("names the thermometer {name}, which has no reading during this test");
+        let silent = || silent(name, self.during);
         let known = self.during.get(name).ok_or_else(silent)?;
         check_range(name, known, "temperature_range_k")?;
         let (Some(from), Some(to)) = (self.at.first(), self.at.last()) else {
