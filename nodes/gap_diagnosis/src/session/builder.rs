@@ -21,7 +21,7 @@ use super::nominal;
 use super::past::Past;
 use super::recent::{LATE_S, Recent};
 use super::record::{MOST_READINGS, MOST_TEMPERATURES, Offset, Record, Tick};
-use super::time::{At, SessionTime};
+use super::time::{At, SessionTime, Source};
 
 /// One recorded sample.
 #[derive(Clone, Debug, PartialEq)]
@@ -137,6 +137,7 @@ impl SessionBuilder {
     pub fn next_bag(&mut self) {
         self.end_bag();
         self.recent.clear();
+        self.time.next_bag();
         self.touches = NewTouches::default();
         self.base = self.greatest;
         self.awaits_bag = true;
@@ -241,9 +242,11 @@ impl SessionBuilder {
         Ok((session, self.account))
     }
 
-    fn session_time(&mut self, at: Stamp<Host>) -> f64 {
+    fn session_time(&mut self, at: Stamp<Host>, source: Source) -> f64 {
         let is_first = std::mem::take(&mut self.awaits_bag);
-        match self.time.take(at) {
+        match self.time.take(at, source) {
+            // Axis states may come behind all else: what has ended is whole when they say so.
+            At::Time(time_s) if source == Source::Other && self.time.follows_axes() => time_s,
             At::Time(time_s) => {
                 let is_over = |(ended_s, _): &(f64, Record)| time_s - ended_s > LATE_S;
                 let over = self.ended.iter().take_while(|run| is_over(run)).count();
@@ -286,7 +289,7 @@ impl SessionBuilder {
             self.account.note(Reason::NotFinite);
             return;
         }
-        let time_s = self.session_time(state.received_at);
+        let time_s = self.session_time(state.received_at, Source::Axes);
         let last = self.recent.ticks.back();
         // Many states may arrive at one instant: their order is the controller's then.
         let is_later =
@@ -349,7 +352,7 @@ impl SessionBuilder {
 
     fn temperature(&mut self, sample: &TemperatureSample) {
         if sample.temperature_degc.is_finite() {
-            let time_s = self.session_time(sample.at);
+            let time_s = self.session_time(sample.at, Source::Other);
             let degc = sample.temperature_degc;
             if !self.past.temperature(time_s, &sample.sensor, degc) {
                 self.account.note(Reason::TooMuch);
@@ -378,7 +381,7 @@ impl SessionBuilder {
             .chain(trigger.approach.iter().copied())
             .all(f64::is_finite)
         {
-            let time_s = self.session_time(trigger.received_at);
+            let time_s = self.session_time(trigger.received_at, Source::Other);
             self.recent.trigger(time_s, &trigger);
             if let Some(run) = self.run_at(trigger.received_at) {
                 run.hold((time_s, trigger), TOUCHES_OF_RUN, |run| &mut run.triggers);

@@ -228,3 +228,33 @@ fn touches_whose_numbers_are_left_out_within_a_run_are_counted_as_lost() {
         assert_eq!(account.losses().count(), usize::from(lost > 0));
     }
 }
+
+#[test]
+fn a_touch_and_a_thermometer_that_come_seconds_behind_the_axes_are_no_jump_of_the_clock() {
+    let mut rig = Rig::new(|_| 0.0);
+    let began = rig.millis;
+    let at = |millis: i64| Stamp::from_nanos(millis * 1_000_000);
+    let segment = |begin, millis| TestSegment {
+        at: at(millis),
+        ..segment(1, begin, TestKind::Latency)
+    };
+    rig.builder.take(Input::Segment(segment(true, began)));
+    let mut place = PerAxis::default();
+    place[Axis::Z] = 30.0;
+    for millis in (began..began + 20_000).step_by(8) {
+        let stamp = at(millis);
+        rig.builder
+            .take(state(stamp, (millis + 7000) * 1_000_000, place, place));
+        // Each comes seven seconds after it was.
+        if (millis - began) % 4000 == 0 && millis > began + 7000 {
+            rig.builder
+                .take(Input::Trigger(touch(millis - 7000, "block_1.x")));
+            rig.builder.take(temperature(millis - 7000));
+        }
+    }
+    let ended = began + 20_000;
+    rig.builder.take(Input::Segment(segment(false, ended)));
+    let (session, account) = rig.builder.finish().expect("a session");
+    assert_eq!(account.count(Reason::ClockJump), 0, "{account:?}");
+    assert_eq!((session.runs.len(), session.runs[0].touches.len()), (1, 3));
+}

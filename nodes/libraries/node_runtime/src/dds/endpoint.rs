@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::convert::Infallible;
 use std::pin::pin;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
 
 use futures::StreamExt;
 use metrology::Stamp;
@@ -109,8 +110,12 @@ fn stamp(time: Timestamp) -> Stamp<Host> {
 
 /// When a sample came, if it is read `now`. RustDDS finds samples by their time and lets it never go back: where the clock was
 /// set back, it stands still in the future until that has come.
-fn received(instant: Timestamp, now: Stamp<Host>) -> Stamp<Host> {
-    stamp(instant).min(now)
+///
+/// A sample that waited for one before it, which was sent again, came with that one (`last`): else it would stand before it
+/// in a bag by log time. Where `last` lies in the future the clock was set back.
+fn received(instant: Timestamp, now: Stamp<Host>, last: Stamp<Host>) -> Stamp<Host> {
+    let at = stamp(instant).min(now);
+    if last <= now { at.max(last) } else { at }
 }
 
 fn timestamp(at: Stamp<Host>) -> Timestamp {
@@ -128,11 +133,23 @@ fn identity(identity: SampleIdentity) -> RequestIdentity {
 /// Reads one topic.
 pub(crate) struct Reader {
     reader: no_key::SimpleDataReader<Bytes, Raw>,
+    /// When the last sample came, ns.
+    last_nanos: AtomicI64,
 }
 
 impl Reader {
     pub(super) fn new(reader: no_key::SimpleDataReader<Bytes, Raw>) -> Self {
-        Self { reader }
+        Self {
+            reader,
+            last_nanos: AtomicI64::new(i64::MIN),
+        }
+    }
+
+    fn received(&self, instant: Timestamp) -> Stamp<Host> {
+        let last = Stamp::from_nanos(self.last_nanos.load(Ordering::Relaxed));
+        let at = received(instant, host_now(), last);
+        self.last_nanos.store(at.nanos(), Ordering::Relaxed);
+        at
     }
 
     /// The next sample; an error is a sample that is no plain CDR.
@@ -143,7 +160,7 @@ impl Reader {
                 writer: change.writer_guid().to_bytes(),
                 sequence: i64::from(change.sequence_number),
                 source: change.source_timestamp().map(stamp),
-                received: received(change.receive_instant, host_now()),
+                received: self.received(change.receive_instant),
                 related: change.related_sample_identity().map(identity),
                 bytes: change.into_value(),
             }),
@@ -261,8 +278,18 @@ mod tests {
         let now = Stamp::from_nanos(1_763_000_000_000_000_000);
         let minute = Span::from_secs_f64(60.0);
         let before = now + Span::from_secs_f64(-0.25);
-        assert_eq!(received(timestamp(before), now), before);
-        assert_eq!(received(timestamp(now + minute), now), now);
+        let first = Stamp::from_nanos(i64::MIN);
+        assert_eq!(received(timestamp(before), now, first), before);
+        assert_eq!(received(timestamp(now + minute), now, first), now);
+    }
+
+    #[test]
+    fn what_waited_for_a_sample_before_it_came_with_that_one_unless_the_clock_was_set_back() {
+        let now = Stamp::from_nanos(1_763_000_000_000_000_000);
+        let ago = |s: f64| now + Span::from_secs_f64(-s);
+        assert_eq!(received(timestamp(ago(11.0)), now, ago(0.25)), ago(0.25));
+        assert_eq!(received(timestamp(ago(0.25)), now, ago(11.0)), ago(0.25));
+        assert_eq!(received(timestamp(ago(0.25)), now, ago(-60.0)), ago(0.25));
     }
 
     #[test]
