@@ -385,8 +385,9 @@ fn beside(
     let beside = simulated::beside(simulated, &machine, &recorded)?;
     let session = beside.as_ref().map_or(&recorded.session, |it| &it.session);
     let (config, in_no_order) = without_time(paths, config)?;
+    let lacks = || [loss::lines(&recorded.readings), recorded.omitted.clone()].concat();
     let mut diagnosis = diagnose(&machine, session, &config)
-        .map_err(|error| bags::not_whole(error.into(), &loss::lines(&recorded.readings)))?;
+        .map_err(|error| bags::not_whole(error.into(), &lacks()))?;
     diagnosis.report.inputs.bags = recorded.bags;
     diagnosis.report.inputs.machine_sha256 = format!("{:x}", Sha256::digest(machine_text));
     diagnosis.report.runtime_s = began.elapsed().as_secs_f64();

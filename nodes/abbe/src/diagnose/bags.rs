@@ -49,7 +49,7 @@ impl Recorded {
     }
 
     fn of(paths: &[PathBuf], machine: &MachineFile, is_recording: bool) -> Result<Self> {
-        let mut builder = SessionBuilder::new(machine, SessionConfig::default())?;
+        let mut builder = SessionBuilder::new(machine, SessionConfig::of_bags())?;
         let (mut readings, mut hashes, mut ends) = (vec![], vec![], vec![]);
         for path in paths {
             let bag = Bag::open(path).with_context(|| format!("bag {}", path.display()))?;

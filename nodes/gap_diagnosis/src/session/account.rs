@@ -28,6 +28,8 @@ pub enum Reason {
     ToldBefore,
     /// A touch whose number is left out between two of one run.
     TouchMissing,
+    /// A touch that came when its run was closed.
+    TouchLate,
     /// The recording's clock jumped back by more than two seconds, or ahead by more than a week.
     ClockJump,
     /// A reading between two axis states that lie too far apart.
@@ -84,6 +86,7 @@ impl Reason {
             | Self::StuckInPart
             | Self::UnknownFeature
             | Self::TouchMissing
+            | Self::TouchLate
             | Self::Cut
             | Self::NotBegun
             | Self::TooLong
@@ -108,6 +111,9 @@ impl Reason {
             Self::OtherMachine => "axis states were of another machine",
             Self::WentBack => "samples were older than one before them",
             Self::ToldBefore => "touches were told before, or a later one before them",
+            Self::TouchLate => {
+                "touches came so long after their run that it was closed without them"
+            }
             Self::TouchMissing => {
                 "touches are not in the recording, as the numbers of those before and after say"
             }

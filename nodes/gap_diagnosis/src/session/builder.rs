@@ -1,5 +1,6 @@
 //! Takes samples in the order of the recording and closes runs.
 
+use std::cmp::Ordering;
 use std::collections::VecDeque;
 
 use machine::file::AxisEntry;
@@ -19,7 +20,7 @@ use super::config::SessionConfig;
 use super::error::SessionError;
 use super::nominal;
 use super::past::Past;
-use super::recent::{LATE_S, Recent};
+use super::recent::Recent;
 use super::record::{MOST_READINGS, MOST_TEMPERATURES, Offset, Record, Tick};
 use super::time::{At, SessionTime, Source};
 
@@ -69,6 +70,8 @@ pub struct SessionBuilder {
     open: Option<Record>,
     /// Runs that have ended, with the time of their end: their last samples may still come.
     ended: VecDeque<(f64, Record)>,
+    /// Begin and end of the last run of touches that was closed.
+    over: Option<[Stamp<Host>; 2]>,
     /// Whether the last segment was the end of a run of touches: one may come, and be stamped, after it.
     awaits_touches: bool,
     touches: NewTouches,
@@ -106,6 +109,7 @@ impl SessionBuilder {
             recent: Recent::default(),
             open: None,
             ended: VecDeque::new(),
+            over: None,
             awaits_touches: false,
             touches: NewTouches::default(),
             runs: vec![],
@@ -138,6 +142,7 @@ impl SessionBuilder {
         self.end_bag();
         self.recent.clear();
         self.time.next_bag();
+        self.over = None;
         self.touches = NewTouches::default();
         self.base = self.greatest;
         self.awaits_bag = true;
@@ -248,7 +253,8 @@ impl SessionBuilder {
             // Axis states may come behind all else: what has ended is whole when they say so.
             At::Time(time_s) if source == Source::Other && self.time.follows_axes() => time_s,
             At::Time(time_s) => {
-                let is_over = |(ended_s, _): &(f64, Record)| time_s - ended_s > LATE_S;
+                let wait_s = self.config.wait_s;
+                let is_over = |(ended_s, _): &(f64, Record)| time_s - ended_s > wait_s;
                 let over = self.ended.iter().take_while(|run| is_over(run)).count();
                 self.close_ended(over);
                 time_s
@@ -340,11 +346,12 @@ impl SessionBuilder {
             at: compensation.at,
             total: compensation.total,
         };
-        let before = self.recent.offsets.back();
-        let is_late = before.is_some_and(|before| offset.at <= before.at);
-        if is_late {
-            self.account.note(Reason::WentBack);
-            return;
+        let before = { self.recent.offsets.back() }.map(|before| offset.at.cmp(&before.at));
+        match before {
+            Some(Ordering::Less) => return self.account.note(Reason::WentBack),
+            // Of several at one instant the first counts.
+            Some(Ordering::Equal) => return,
+            Some(Ordering::Greater) | None => {}
         }
         self.recent.offset(offset);
         self.records().for_each(|run| run.compensated(offset));
@@ -389,6 +396,10 @@ impl SessionBuilder {
                 && let Some((_, ended)) = self.ended.back_mut()
             {
                 ended.hold((time_s, trigger), TOUCHES_OF_RUN, |run| &mut run.triggers);
+            } else if { self.over }
+                .is_some_and(|[from, to]| (from..=to).contains(&trigger.received_at))
+            {
+                self.account.note(Reason::TouchLate);
             }
         } else {
             self.account.note(Reason::NotFinite);
@@ -464,6 +475,9 @@ impl SessionBuilder {
     fn close_ended(&mut self, many: usize) {
         for _ in 0..many {
             if let Some((_, ended)) = self.ended.pop_front() {
+                if touches_only(ended.segment.kind) {
+                    self.over = Some(ended.span());
+                }
                 self.close(ended);
             }
         }

@@ -1,5 +1,7 @@
 //! How much of a recording is kept.
 
+use super::recent::LATE_S;
+
 /// How a session is gathered. Physics comes from the machine file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SessionConfig {
@@ -11,6 +13,8 @@ pub struct SessionConfig {
     pub readings_per_run: usize,
     /// Most ticks of a run that are held while it is open; later ones are counted and left out.
     pub ticks_per_run: usize,
+    /// For how long a run that has ended waits for its last samples, s: of a live machine it is to be diagnosed soon.
+    pub wait_s: f64,
     /// Spacing of the slow history, s.
     pub history_step_s: f64,
 }
@@ -22,7 +26,19 @@ impl Default for SessionConfig {
             settle_s: 0.3,
             readings_per_run: 2000,
             ticks_per_run: 2_000_000,
+            wait_s: LATE_S,
             history_step_s: 10.0,
+        }
+    }
+}
+
+impl SessionConfig {
+    /// The same for recordings: a busy recorder may have taken a touch a minute late, and nobody waits for the diagnosis.
+    #[must_use]
+    pub fn of_bags() -> Self {
+        Self {
+            wait_s: 60.0,
+            ..Self::default()
         }
     }
 }

@@ -169,6 +169,12 @@ impl Record {
         self.temperatures.retain(|sample| sample.at <= to);
     }
 
+    /// Instants between which a sample is of the run; all of them where it has no begin or end.
+    pub(super) fn span(&self) -> [Stamp<Host>; 2] {
+        let from = self.from.unwrap_or(Stamp::from_nanos(i64::MIN));
+        [from, self.to.unwrap_or(Stamp::from_nanos(i64::MAX))]
+    }
+
     /// Gives up the touches from an instant on: they are of the run that began then.
     pub(super) fn give_up(&mut self, from: Stamp<Host>) {
         self.triggers.retain(|(_, touch)| touch.received_at < from);

@@ -258,3 +258,36 @@ fn a_touch_and_a_thermometer_that_come_seconds_behind_the_axes_are_no_jump_of_th
     assert_eq!(account.count(Reason::ClockJump), 0, "{account:?}");
     assert_eq!((session.runs.len(), session.runs[0].touches.len()), (1, 3));
 }
+
+#[test]
+fn a_touch_behind_its_closed_run_is_lost_and_said_and_a_bag_waits_for_it() {
+    for (config, touches, late) in [
+        (SessionConfig::default(), 1, 1),
+        (SessionConfig::of_bags(), 2, 0),
+    ] {
+        let mut builder = SessionBuilder::new(&machine(), config).expect("a machine");
+        let at = |millis: i64| Stamp::from_nanos(millis * 1_000_000);
+        let segment = |begin, millis| TestSegment {
+            at: at(millis),
+            ..segment(1, begin, TestKind::Latency)
+        };
+        let mut place = PerAxis::default();
+        place[Axis::Z] = 30.0;
+        for millis in (0..12_000).step_by(8) {
+            if millis == 1000 || millis == 4000 {
+                builder.take(Input::Segment(segment(millis == 1000, millis)));
+            }
+            let controller = (millis + 7000) * 1_000_000;
+            builder.take(state(at(millis), controller, place, place));
+            if millis == 2000 {
+                builder.take(Input::Trigger(touch(millis, "block_1.x")));
+            }
+        }
+        // Stamped in the run, and told eight seconds after its end.
+        builder.take(Input::Trigger(touch(3000, "block_1.x")));
+        let (session, account) = builder.finish().expect("a session");
+        let found = session.runs[0].touches.len();
+        assert_eq!((found, account.count(Reason::TouchLate)), (touches, late));
+        assert_eq!(account.losses().count(), late);
+    }
+}
