@@ -41,7 +41,8 @@ impl Recent {
 
     /// Whether a stamp is older than any message may be, or ahead of the samples by as much.
     pub(super) fn is_of_another_time(&self, at: Stamp<Host>) -> bool {
-        self.ahead_s(at).is_some_and(|ahead_s| ahead_s.abs() > LATE_S)
+        self.ahead_s(at)
+            .is_some_and(|ahead_s| ahead_s.abs() > LATE_S)
     }
 
     /// How far a stamp is ahead of the newest sample.

@@ -14,7 +14,7 @@ const SAME_PLACE_MM: f64 = 1.0;
 /// Greatest difference of the directions of two approaches that are one.
 const SAME_APPROACH: f64 = 0.01;
 /// Greatest difference of two feeds that are one, as a share: they are measured.
-const SAME_FEED: f64 = 0.02;
+const SAME_MEASURED_FEED: f64 = 0.02;
 
 /// What touches that repeat each other have in common.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -78,7 +78,7 @@ fn is_same(a: &Touch, b: &Touch) -> bool {
     let feeds_mm_s = (a.feed_mm_s - b.feed_mm_s).abs();
     a.feature_id == b.feature_id
         && (a.approach - b.approach).norm() < SAME_APPROACH
-        && (feeds_mm_s.is_nan() || feeds_mm_s <= SAME_FEED * a.feed_mm_s.abs())
+        && (feeds_mm_s.is_nan() || feeds_mm_s <= SAME_MEASURED_FEED * a.feed_mm_s.abs())
         && Axis::LINEAR.iter().all(|axis| off(axis) < SAME_PLACE_MM)
         && Axis::ROTARY.iter().all(|axis| off(axis) < POSE_RAD)
 }
