@@ -16,6 +16,7 @@ use gap_diagnosis::{GapConfig, GapReport, Rule, diagnose};
 use machine::MachineFile;
 use node_runtime::text_file;
 use trials::baseline::{self, Names};
+use trials::shop::Samples;
 use trials::{Method, Rig, Sample, measure};
 use twin::Session;
 
@@ -26,7 +27,7 @@ use abbe::diagnose::bags::Recorded;
 const NOBODY: u32 = 65_534;
 
 /// The machine file with the named effects, in a trial's folder.
-const FOUND: &str = "found.yaml";
+pub const FOUND: &str = "found.yaml";
 /// The plan that was measured, in the folder of a trial that has a second round.
 pub const PLAN: &str = "plan.yaml";
 /// Folder that the diagnosis may write into.
@@ -113,6 +114,26 @@ pub fn make_told(folder: &Path) -> Result<()> {
     Ok(())
 }
 
+/// Makes the file that the named effects go to, in a trial's folder that the diagnosis may not write into.
+///
+/// # Errors
+/// When it cannot be made.
+pub fn make_found(folder: &Path) -> Result<()> {
+    let found = folder.join(FOUND);
+    std::fs::write(&found, "")?;
+    std::fs::set_permissions(&found, std::fs::Permissions::from_mode(0o666))?;
+    Ok(())
+}
+
+/// The machine file with the named effects that a diagnosis wrote.
+///
+/// # Errors
+/// When it is none.
+pub fn read_found(folder: &Path) -> Result<MachineFile> {
+    let text = text_file::yaml(&folder.join(FOUND))?;
+    Ok(MachineFile::parse(&text, FOUND)?)
+}
+
 /// The diagnosis in a folder: as nobody, where this program runs as root.
 ///
 /// # Errors
@@ -161,11 +182,8 @@ pub fn as_process(folder: &Path, bags: &[&str], question: &Question<'_>) -> Resu
     if let Some(class) = question.left_out {
         command.args(["--without", class]);
     }
-    let found = folder.join(FOUND);
     if question.writes_machine {
-        // In a folder that it may not write into, a file of its own.
-        std::fs::write(&found, "")?;
-        std::fs::set_permissions(&found, std::fs::Permissions::from_mode(0o666))?;
+        make_found(folder)?;
         command.args(["--write-machine", FOUND]);
     }
     if let Some(rule) = question.ablated {
@@ -182,8 +200,7 @@ pub fn as_process(folder: &Path, bags: &[&str], question: &Question<'_>) -> Resu
     }
     let report = serde_json::from_slice(&output.stdout).context("report of abbe diagnose")?;
     let machine = if question.writes_machine {
-        let text = text_file::yaml(&found)?;
-        Some(MachineFile::parse(&text, FOUND)?)
+        Some(read_found(folder)?)
     } else {
         None
     };
@@ -234,11 +251,30 @@ pub fn in_process((machine, session): &Recording, question: &Question<'_>) -> Di
 /// # Errors
 /// When the rig cannot be measured.
 pub fn bare_um(rig: &Rig) -> Result<Option<f64>> {
-    let Ok((machine, session)) = recorded(&[rig])? else {
-        return Ok(None);
-    };
-    let diagnosis = diagnose(&machine, &session, &later::nothing_named()).ok();
-    Ok(diagnosis.and_then(|diagnosis| diagnosis.report.shrink.rms_um.before))
+    let recording = recorded(&[rig])?;
+    Ok(recording.ok().as_ref().and_then(left_um))
+}
+
+/// What is left on held-out runs of a recording of a machine that hides nothing, µm.
+pub fn left_um((machine, session): &Recording) -> Option<f64> {
+    let diagnosis = diagnose(machine, session, &later::nothing_named()).ok()?;
+    diagnosis.report.shrink.rms_um.before
+}
+
+/// The session of samples of a machine, or the reason why it cannot be made.
+///
+/// # Errors
+/// When the machine file is none.
+pub fn taken(machine_text: &str, samples: &Samples) -> Result<Result<Recording, String>> {
+    let machine = MachineFile::parse(machine_text, "machine.yaml")?;
+    let mut builder = SessionBuilder::new(&machine, SessionConfig::default())?;
+    for (_, sample) in samples {
+        builder.take(input(sample.clone()));
+    }
+    Ok(match builder.finish() {
+        Ok((session, _)) => Ok((machine, session)),
+        Err(error) => Err(error.to_string()),
+    })
 }
 
 /// What other methods name, and the signatures of the whole catalogue.

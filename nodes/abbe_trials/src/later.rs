@@ -17,7 +17,7 @@ use trials::Rig;
 use twin::Session;
 use twin::effects::CATALOGUE;
 
-use crate::blind;
+use crate::blind::{self, Recording};
 
 /// (1); none where there is no gap.
 ///
@@ -25,16 +25,15 @@ use crate::blind;
 /// When the rig cannot be measured.
 pub fn closed(rig: &Rig, with: &MachineFile) -> Result<Option<f64>> {
     let later = rig.later(rig.plan.clone());
-    let Ok((machine, session)) = blind::recorded(&[&later])? else {
-        return Ok(None);
-    };
-    let (Some(before), Some(after)) = (
-        beyond_floor(&machine, &session),
-        beyond_floor(with, &session),
-    ) else {
-        return Ok(None);
-    };
-    Ok((before > 0.0).then(|| 1.0 - after.max(0.0) / before))
+    let recording = blind::recorded(&[&later])?;
+    Ok(recording.ok().and_then(|it| closed_on(&it, with)))
+}
+
+/// (1) on a recording; none where there is no gap.
+pub fn closed_on((machine, session): &Recording, with: &MachineFile) -> Option<f64> {
+    let before = beyond_floor(machine, session)?;
+    let after = beyond_floor(with, session)?;
+    (before > 0.0).then(|| 1.0 - after.max(0.0) / before)
 }
 
 /// Mean square beyond the floor on held-out runs, µm²; with a machine file that names everything that is known.

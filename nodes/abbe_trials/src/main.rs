@@ -84,7 +84,7 @@ struct Trials {
     /// Arms, by number: i catalogue, ii a class left out, iii different physics, iv null, v null with worse noise,
     /// vi confusable pairs, vii the same with one more run of the diagnosis' choice; alone: each class in turn, large enough to be named;
     /// limit: each class in turn, about as small as can be named; own, own-left-out: classes with programmes of their own;
-    /// s1 a shop's ISO 230-2 run, s2 its ballbar, s3 its logs: with a table of their own; s5 a designed programme, s6 the same with
+    /// s1 a shop's ISO 230-2 run, s2 its ballbar, s3 its logs, s4 its shift of four hours: with a table of their own; s5 a designed programme, s6 the same with
     /// a class left out, s7 the same with a designed second round: with a table of their own.
     #[arg(long, value_delimiter = ',', default_value = "i")]
     arm: Vec<Arm>,
@@ -224,11 +224,13 @@ impl Trials {
             return Ok(false);
         }
         if of_a_shop < arms.len() {
-            bail!("--arm: s1, s2 and s3 have a table of their own; run them without other arms");
+            bail!(
+                "--arm: s1, s2, s3 and s4 have a table of their own; run them without other arms"
+            );
         }
         if self.in_process || self.baselines || !self.ablate.is_empty() {
             bail!(
-                "--arm s1, s2, s3: sessions of tables are imported and diagnosed as processes with all rules; \
+                "--arm s1, s2, s3, s4: sessions of shops are diagnosed as processes with all rules; \
                  leave out --in-process, --baselines and --ablate"
             );
         }

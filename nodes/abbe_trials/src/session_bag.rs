@@ -11,6 +11,7 @@ use recorder::{
     Channel, ChannelId, ChunkCompression, Directory, MessageStamp, RecorderConfig, Recording,
     RunContext,
 };
+use trials::shop::Samples;
 use trials::{Rig, Sample, measure};
 
 /// Simulated time passes quickly: a chunk may span this much of it.
@@ -28,27 +29,7 @@ struct SessionBag {
 /// # Errors
 /// When the rig cannot be measured or the bag not written.
 pub fn write(rig: &Rig, path: &Path, machine_text: String) -> Result<()> {
-    let name = path
-        .file_name()
-        .context("bag without a name")?
-        .to_string_lossy();
-    let config = RecorderConfig {
-        compression: ChunkCompression::Zstd,
-        flush_period_s: FLUSH_S,
-        ..RecorderConfig::default()
-    };
-    let mut recording = Recording::begin(Directory::create(path)?, &name, config)?;
-    recording.add_context(&RunContext {
-        start_time_nanos: u64::try_from(rig.start_s * NANOS_PER_S).context("start of a session")?,
-        commit: abbe::COMMIT.to_owned(),
-        machine_file: Some(machine_text),
-        ..RunContext::default()
-    })?;
-    let mut bag = SessionBag {
-        recording,
-        channels: vec![],
-        messages: 0,
-    };
+    let mut bag = SessionBag::begin(path, machine_text, rig.start_s)?;
     let mut outcome = Ok(());
     measure(rig, &mut |at, sample| {
         if outcome.is_ok() {
@@ -60,7 +41,47 @@ pub fn write(rig: &Rig, path: &Path, machine_text: String) -> Result<()> {
     Ok(())
 }
 
+/// Writes samples in their order into a bag.
+///
+/// # Errors
+/// When the bag cannot be written.
+pub fn write_samples(samples: &Samples, path: &Path, machine_text: String) -> Result<()> {
+    let start_s = samples
+        .first()
+        .map_or(0, |(at, _)| at.nanos() / NANOS_PER_S);
+    let mut bag = SessionBag::begin(path, machine_text, start_s)?;
+    for (at, sample) in samples {
+        bag.take(*at, sample)?;
+    }
+    bag.recording.finish()?;
+    Ok(())
+}
+
 impl SessionBag {
+    fn begin(path: &Path, machine_text: String, start_s: i64) -> Result<Self> {
+        let name = path
+            .file_name()
+            .context("bag without a name")?
+            .to_string_lossy();
+        let config = RecorderConfig {
+            compression: ChunkCompression::Zstd,
+            flush_period_s: FLUSH_S,
+            ..RecorderConfig::default()
+        };
+        let mut recording = Recording::begin(Directory::create(path)?, &name, config)?;
+        recording.add_context(&RunContext {
+            start_time_nanos: u64::try_from(start_s * NANOS_PER_S).context("start of a session")?,
+            commit: abbe::COMMIT.to_owned(),
+            machine_file: Some(machine_text),
+            ..RunContext::default()
+        })?;
+        Ok(Self {
+            recording,
+            channels: vec![],
+            messages: 0,
+        })
+    }
+
     fn take(&mut self, at: Stamp<Host>, sample: &Sample) -> Result<()> {
         match sample {
             Sample::State(state) => self.write(at, &topics::AXES_STATE, state),

@@ -1,4 +1,4 @@
-//! A trial on a shop's session: its tables are imported by the product, and diagnosed as a process.
+//! A trial on a shop's session: its tables are imported by the product, or its shift is a bag; it is diagnosed as a process.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,13 +7,15 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use gap_diagnosis::GapReport;
+use gap_diagnosis::report::Status;
 use node_runtime::text_file;
-use trials::shop::{Answer, ShopEffect, ShopSession, answer};
+use trials::shop::{Answer, Shift, ShopEffect, ShopSession, answer};
 use trials::{Truth, Verdict, judge};
 
 use crate::blind;
 use crate::seal::Seal;
 use crate::trial::{How, Which};
+use crate::{later, session_bag};
 
 mod page;
 mod ten_lines;
@@ -22,6 +24,9 @@ pub use page::Table;
 
 /// The report, where the diagnosis may write.
 const REPORT: &str = "told/gap.json";
+
+/// The bag of a shift.
+const BAG: &str = "shift";
 
 /// A report with its page, or the reason why the session was refused.
 type Reported = Result<(GapReport, String), String>;
@@ -42,21 +47,30 @@ pub fn trial(how: &How, which: &Which<'_>, tell: &dyn Fn(&str)) -> Result<Vec<Ve
     }
     std::fs::create_dir_all(&folder).with_context(|| format!("{}", folder.display()))?;
     write(&session, &folder)?;
-    let truth = Truth::of_a_shop(which.arm, which.seed, which.index, session.truth);
+    let mut truth = Truth::of_a_shop(which.arm, which.seed, which.index, session.truth);
+    truth.bare_um = bare_um(&session.shift, &session.machine, &truth)?;
     let seal = Seal::write(&how.sealed, &name, &truth)?;
     tell(&format!("sealed {name}: sha256 {}", seal.sha256));
     let making_s = began.elapsed().as_secs_f64();
     let began = Instant::now();
-    let names: Vec<&str> = session
+    let mut names: Vec<&str> = session
         .tables
         .iter()
         .map(|table| table.name.as_str())
         .collect();
+    let is_shift = session.shift.is_some();
     let reported = match imported(&folder, &names)? {
-        Ok(()) => diagnosed(&folder, &names)?,
+        Ok(()) => {
+            names.extend(is_shift.then_some(BAG));
+            diagnosed(&folder, &names, is_shift)?
+        }
         Err(reason) => Err(reason),
     };
     let diagnosis_s = began.elapsed().as_secs_f64();
+    let later_closed = match (&session.shift, &reported) {
+        (Some(shift), Ok((report, _))) => later_closed(shift, &session.machine, report, &folder)?,
+        _ => None,
+    };
     if !how.keep {
         std::fs::remove_dir_all(&folder)?;
     }
@@ -75,7 +89,7 @@ pub fn trial(how: &How, which: &Which<'_>, tell: &dyn Fn(&str)) -> Result<Vec<Ve
         ablated: None,
         baselines: BTreeMap::new(),
         likeness: vec![],
-        later_closed: None,
+        later_closed,
         second: None,
         shop: shop.filter(|answer| *answer != Answer::default()),
     }])
@@ -87,7 +101,38 @@ fn write(session: &ShopSession, folder: &Path) -> Result<()> {
         std::fs::write(folder.join(format!("{}.csv", table.name)), &table.text)?;
         std::fs::write(folder.join(format!("{}.yaml", table.name)), &table.map)?;
     }
+    if let Some(shift) = &session.shift {
+        let bag = folder.join(BAG);
+        session_bag::write_samples(&shift.samples, &bag, session.machine.clone())?;
+        blind::make_found(folder)?;
+    }
     blind::make_told(folder)
+}
+
+/// What is left of a shift that hides nothing, where one hides something, µm.
+fn bare_um(shift: &Option<Shift>, machine: &str, truth: &Truth) -> Result<Option<f64>> {
+    let hides = truth.shop.as_ref().is_some_and(|it| !it.effects.is_empty());
+    let Some(shift) = shift.as_ref().filter(|_| hides) else {
+        return Ok(None);
+    };
+    let recording = blind::taken(machine, &shift.bare)?;
+    Ok(recording.ok().as_ref().and_then(blind::left_um))
+}
+
+/// What the named effects close on the shift once more, where each of them stands alone.
+fn later_closed(
+    shift: &Shift,
+    machine: &str,
+    report: &GapReport,
+    folder: &Path,
+) -> Result<Option<f64>> {
+    let has = |status: Status| report.causes.iter().any(|cause| cause.status == status);
+    if !has(Status::Named) || has(Status::Set) {
+        return Ok(None);
+    }
+    let found = blind::read_found(folder)?;
+    let recording = blind::taken(machine, &shift.later)?;
+    Ok(recording.ok().and_then(|it| later::closed_on(&it, &found)))
 }
 
 /// Makes a bag of every table, named as it is.
@@ -116,8 +161,11 @@ fn imported(folder: &Path, names: &[&str]) -> Result<Result<(), String>> {
 }
 
 /// Diagnoses the bags, with the whole page: thermometers stand in its remarks alone.
-fn diagnosed(folder: &Path, names: &[&str]) -> Result<Reported> {
+fn diagnosed(folder: &Path, names: &[&str], writes_machine: bool) -> Result<Reported> {
     let mut process = blind::process(folder)?;
+    if writes_machine {
+        process.command.args(["--write-machine", blind::FOUND]);
+    }
     let output = process
         .command
         .args(names)

@@ -10,7 +10,7 @@ use reports::screen::Screen;
 use reports::section::{Rows, Section};
 use serde::Serialize;
 use trials::proportion::Proportion;
-use trials::shop::{Line, ShopTally, Split};
+use trials::shop::{Line, Middle, ShopTally, Split};
 use trials::{Arm, Verdict};
 
 use super::ten_lines::ten_lines;
@@ -118,6 +118,13 @@ fn section(tally: &ShopTally) -> Section {
             "Open: the interval holds the target. Unanswered sessions count in the first row alone."
                 .to_owned(),
     });
+    if !tally.middles.is_empty() {
+        section.tables.push(Rows {
+            head: words(&["median", "value", "of", "target", ""]),
+            rows: tally.middles.iter().map(middle_row).collect(),
+            note: String::new(),
+        });
+    }
     section.tables.push(Rows {
         head: words(&["hidden", "found, D < 10", "10 to 20", "> 20", "with a wrong name", "size of D 20"]),
         rows: tally.kinds.iter().map(|kind| split(kind, true)).collect(),
@@ -160,10 +167,30 @@ fn figure(line: &Line) -> Vec<String> {
         line.what.clone(),
         format!("{}/{} = {share}", line.count.k, line.count.n),
         format!("{low:.1} to {high:.1} %"),
-        line.target.map_or(String::new(), |target| {
-            format!("{sign} {}", percent(target))
-        }),
+        match (line.target, line.most) {
+            (None, _) => String::new(),
+            (Some(least), Some(most)) => format!("{} to {}", percent(least), percent(most)),
+            (Some(target), None) => format!("{sign} {}", percent(target)),
+        },
         line.verdict().to_owned(),
+    ]
+}
+
+fn middle_row(middle: &Middle) -> Vec<String> {
+    let sign = if middle.is_high { "≥" } else { "≤" };
+    let verdict = match middle.is_met() {
+        Some(true) => "met",
+        Some(false) => "missed",
+        None => "",
+    };
+    vec![
+        middle.what.clone(),
+        middle
+            .value
+            .map_or("-".to_owned(), |value| format!("{value:.3}")),
+        middle.n.to_string(),
+        format!("{sign} {}", middle.target),
+        verdict.to_owned(),
     ]
 }
 

@@ -12,7 +12,8 @@ pub fn ten_lines(arms: &[ShopTally]) -> Vec<String> {
     let [laser, ballbar, logs] = [Arm::ShopPositioning, Arm::ShopBallbar, Arm::ShopLogs].map(of);
     let nothing = "nothing hidden: a cause named";
     let wrong = "a wrong name";
-    vec![
+    let shift = of(Arm::ShopShift).map(of_a_shift);
+    let lines = vec![
         format!(
             "A name was wrong, or alone where only a set was right, in {} of laser runs, {} of ballbars, {} of logs.",
             share(laser, wrong),
@@ -65,7 +66,19 @@ pub fn ten_lines(arms: &[ShopTally]) -> Vec<String> {
             by(logs, MEMORY, &["none"]),
             by(logs, MEMORY, &["0.5 and more"])
         ),
-    ]
+    ];
+    lines.into_iter().chain(shift).collect()
+}
+
+/// One more line, where shifts were tried.
+fn of_a_shift(tally: &ShopTally) -> String {
+    let own = |what: &str| share(Some(tally), what);
+    format!(
+        "By a shift of four hours: a wrong name in {}; above D 20 what it tells is named in {}, a change has its instant in {}.",
+        own("a wrong name"),
+        own("D above 20, resolvable: named"),
+        own("D above 20: a change with its instant, within a test cycle")
+    )
 }
 
 /// Title of the split by noise.

@@ -46,11 +46,13 @@ pub enum Arm {
     DesignedLeftOut,
     /// One effect that has a double or is small; a designed second round follows the designed programme.
     DesignedTwoRounds,
+    /// A shift of four hours with circles, blocks and production.
+    ShopShift,
 }
 
 impl Arm {
     /// Every arm, in order.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Catalogue,
         Self::LeftOut,
         Self::Foreign,
@@ -68,6 +70,7 @@ impl Arm {
         Self::Designed,
         Self::DesignedLeftOut,
         Self::DesignedTwoRounds,
+        Self::ShopShift,
     ];
 
     /// Its number in the protocol; the others go by their names.
@@ -91,6 +94,7 @@ impl Arm {
             "s5",
             "s6",
             "s7",
+            "s4",
         ][self as usize]
     }
 
@@ -115,6 +119,7 @@ impl Arm {
             "a designed programme",
             "a designed programme, a class left out",
             "a designed programme and a designed second round",
+            "a shift of four hours",
         ][self as usize]
     }
 
@@ -136,12 +141,12 @@ impl Arm {
         )
     }
 
-    /// Whether its sessions are tables as shops have them.
+    /// Whether its sessions are those of shops: tables, or the bag of a shift.
     #[must_use]
     pub const fn is_of_a_shop(self) -> bool {
         matches!(
             self,
-            Self::ShopPositioning | Self::ShopBallbar | Self::ShopLogs
+            Self::ShopPositioning | Self::ShopBallbar | Self::ShopLogs | Self::ShopShift
         )
     }
 

@@ -10,6 +10,7 @@
 //! | s1 | one ISO 230-2 run of an axis | `positioning`, `lead`, `layout` |
 //! | s2 | circles of a ballbar | `ballbar`, `machine_motion` |
 //! | s3 | logs of displacement and temperatures | `logs`, `heat` |
+//! | s4 | a shift of four hours | `shift` |
 
 use rand_pcg::Pcg64Mcg;
 
@@ -27,12 +28,14 @@ mod machine_motion;
 mod metric;
 mod positioning;
 mod shape;
+mod shift;
 mod tally;
 mod truth;
 
-pub use judge::{Answer, answer, follows_in};
-pub use tally::{Line, ShopTally, Split};
-pub use truth::{Follow, Name, ShopEffect, ShopTruth};
+pub use judge::{Answer, Reported, answer, follows_in};
+pub use shift::Samples;
+pub use tally::{Line, Middle, ShopTally, Split};
+pub use truth::{Change, Follow, Name, ShiftTimes, ShopEffect, ShopTruth};
 
 /// One table of a session with its map.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,6 +48,17 @@ pub struct Table {
     pub map: String,
 }
 
+/// A shift as a recorder has it, with what its judge needs beside it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shift {
+    /// The samples of its bag.
+    pub samples: Samples,
+    /// The same with nothing hidden: what no simulator goes below.
+    pub bare: Samples,
+    /// The same shift with another draw of its noise.
+    pub later: Samples,
+}
+
 /// A session as its user has it, and what is true of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShopSession {
@@ -54,6 +68,8 @@ pub struct ShopSession {
     pub machine: String,
     /// What is to be found.
     pub truth: ShopTruth,
+    /// What is recorded instead of tables.
+    pub shift: Option<Shift>,
 }
 
 impl ShopSession {
@@ -65,6 +81,7 @@ impl ShopSession {
             Arm::ShopPositioning => Some(positioning::draw(&mut random)),
             Arm::ShopBallbar => Some(ballbar::draw(&mut random)),
             Arm::ShopLogs => Some(logs::draw(&mut random)),
+            Arm::ShopShift => Some(shift::draw(&mut random)),
             _ => None,
         }
     }

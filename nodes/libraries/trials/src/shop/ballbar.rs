@@ -17,9 +17,9 @@ use super::{ShopSession, Table};
 /// D of hidden effects.
 const D_OF_BALLBAR: [f64; 2] = [4.0, 300.0];
 /// Letters of the axes.
-const LETTERS: [&str; 3] = ["X", "Y", "Z"];
+pub(super) const LETTERS: [&str; 3] = ["X", "Y", "Z"];
 /// Planes: name, axes, and the pair as the catalogue names it.
-const PLANES: [(&str, [usize; 2], &str); 3] = [
+pub(super) const PLANES: [(&str, [usize; 2], &str); 3] = [
     ("XY", [0, 1], "XY"),
     ("YZ", [1, 2], "YZ"),
     ("ZX", [2, 0], "XZ"),
@@ -27,14 +27,17 @@ const PLANES: [(&str, [usize; 2], &str); 3] = [
 /// Time between two tables: a mounting, s.
 const MOUNTING_S: u64 = 1200;
 /// D that other hidden effects must leave of one that can be told from them.
-const MIN_D_APART: f64 = 5.0;
+pub(super) const MIN_D_APART: f64 = 5.0;
 /// Readings that a period needs.
 const MIN_READINGS_OF_A_PERIOD: f64 = 5.0;
 
 /// Circles of one plane and feed: a table.
-struct Mounted {
-    plane: usize,
-    circles: Vec<Circle>,
+#[derive(Clone, Debug)]
+pub(super) struct Mounted {
+    /// Which of [`PLANES`].
+    pub plane: usize,
+    /// Its circles, in their order.
+    pub circles: Vec<Circle>,
 }
 
 /// What is hidden, with its readings at size 1 of all tables together.
@@ -75,6 +78,7 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
     }
     let feeds = tables.len() / planes.len();
     ShopSession {
+        shift: None,
         machine: super::positioning::machine([lead_mm; 3]),
         truth: ShopTruth {
             session: format!(
@@ -89,6 +93,7 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
             white_um: floor.white_um,
             between_runs_um: floor.between_runs_um,
             memory: floor.memory,
+            shift: None,
         },
         tables: written(&tables, &noise),
     }
@@ -193,7 +198,12 @@ fn set_up(tables: &[Mounted], len: usize) -> Vec<Vec<f64>> {
 }
 
 /// Different effects of axes and pairs that the circles show.
-fn motions(random: &mut Pcg64Mcg, tables: &[Mounted], lead_mm: f64, count: usize) -> Vec<Motion> {
+pub(super) fn motions(
+    random: &mut Pcg64Mcg,
+    tables: &[Mounted],
+    lead_mm: f64,
+    count: usize,
+) -> Vec<Motion> {
     let mut axes: Vec<usize> = circles(tables).flat_map(|circle| circle.axes).collect();
     axes.sort_unstable();
     axes.dedup();
@@ -227,7 +237,8 @@ fn motions(random: &mut Pcg64Mcg, tables: &[Mounted], lead_mm: f64, count: usize
 }
 
 impl Motion {
-    fn name(&self) -> Name {
+    /// Its name in the catalogue.
+    pub(super) fn name(&self) -> Name {
         match self {
             Self::Squareness(axes) => {
                 let plane = PLANES.iter().find(|(_, own, _)| own == axes);
@@ -241,7 +252,8 @@ impl Motion {
         }
     }
 
-    const fn words(&self) -> &'static str {
+    /// In the words of a shop.
+    pub(super) const fn words(&self) -> &'static str {
         match self {
             Self::Squareness(_) => "squareness",
             Self::Scale(_) => "scale of an axis",
@@ -252,7 +264,8 @@ impl Motion {
         }
     }
 
-    const fn sizes(&self) -> ([f64; 2], &'static str) {
+    /// Least and greatest size, and the unit.
+    pub(super) const fn sizes(&self) -> ([f64; 2], &'static str) {
         match self {
             Self::Squareness(_) => ([2.0, 300.0], "µrad"),
             Self::Scale(_) => ([2.0, 300.0], "µm/m"),
@@ -263,7 +276,8 @@ impl Motion {
         }
     }
 
-    const fn has_both_signs(&self) -> bool {
+    /// Whether its size may be negative.
+    pub(super) const fn has_both_signs(&self) -> bool {
         matches!(self, Self::Squareness(_) | Self::Scale(_) | Self::Slow(_))
     }
 
@@ -290,19 +304,8 @@ fn sole_partner(tables: &[Mounted], axis: usize) -> Option<usize> {
     }
 }
 
-fn effect(
-    tables: &[Mounted],
-    metric: &Metric,
-    set_up: &[Vec<f64>],
-    hidden: &[Hidden],
-    own: usize,
-) -> ShopEffect {
-    let Hidden { motion, size, one } = &hidden[own];
-    let readings: Vec<f64> = one.iter().map(|value| size * value).collect();
-    let others = || { hidden.iter().enumerate() }.filter(|(k, _)| *k != own);
-    let mut taken_out = set_up.to_vec();
-    taken_out.extend(others().map(|(_, other)| other.one.clone()));
-    let d_alone = metric.d(&readings, &taken_out);
+/// What makes the same readings as a motion on these circles.
+pub(super) fn look_alikes(tables: &[Mounted], motion: &Motion) -> Vec<Name> {
     let (id, axis) = motion.name();
     let mut same = vec![];
     let feeds_of = |plane: usize| tables.iter().filter(move |table| table.plane == plane);
@@ -321,12 +324,29 @@ fn effect(
             same.push(name(&id, LETTERS[other]));
         }
     }
+    same
+}
+
+fn effect(
+    tables: &[Mounted],
+    metric: &Metric,
+    set_up: &[Vec<f64>],
+    hidden: &[Hidden],
+    own: usize,
+) -> ShopEffect {
+    let Hidden { motion, size, one } = &hidden[own];
+    let readings: Vec<f64> = one.iter().map(|value| size * value).collect();
+    let others = || { hidden.iter().enumerate() }.filter(|(k, _)| *k != own);
+    let mut taken_out = set_up.to_vec();
+    taken_out.extend(others().map(|(_, other)| other.one.clone()));
+    let d_alone = metric.d(&readings, &taken_out);
+    let mut same = look_alikes(tables, motion);
     if d_alone < MIN_D_APART {
         same.extend(others().map(|(_, other)| other.motion.name()));
     }
     ShopEffect {
         what: motion.words().to_owned(),
-        names: vec![(id, axis)],
+        names: vec![motion.name()],
         besides: vec![],
         same_readings: same,
         size: *size,
@@ -334,6 +354,8 @@ fn effect(
         d: metric.d(&readings, set_up),
         d_alone,
         follow: None,
+        parameter: None,
+        change: None,
     }
 }
 

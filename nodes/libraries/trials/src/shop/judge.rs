@@ -7,8 +7,11 @@ use gap_diagnosis::GapReport;
 use gap_diagnosis::report::Status;
 use serde::{Deserialize, Serialize};
 
-use super::truth::{Follow, Name, ShopEffect, ShopTruth};
+use super::truth::{Follow, Name, ShiftTimes, ShopEffect, ShopTruth};
 use crate::verdict::{SaidCause, Verdict};
+
+/// Tests of one visit begin within this time, s.
+const SAME_VISIT_S: f64 = 1800.0;
 
 /// What an answer has beside its causes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -18,6 +21,19 @@ pub struct Answer {
     pub does_not_repeat: usize,
     /// Thermometers that the log goes with, by the page's remark.
     pub follows: Vec<Follow>,
+    /// First runs of which the report says that something began or changed there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub changes: Vec<Reported>,
+}
+
+/// A run at which something is reported to change.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reported {
+    /// The named effect that does; none of a change without a name.
+    pub effect: Option<Name>,
+    /// The first run after it.
+    pub run: u32,
 }
 
 /// What a report and its page add to the causes.
@@ -26,7 +42,26 @@ pub fn answer(report: &GapReport, page: &str) -> Answer {
     Answer {
         does_not_repeat: report.does_not_repeat.len(),
         follows: follows_in(page),
+        changes: changes(report),
     }
+}
+
+/// Runs from which on something is reported to be there, to be another, or not to repeat.
+fn changes(report: &GapReport) -> Vec<Reported> {
+    let named = report.over_session.iter().flat_map(|own| {
+        let effect = Some((own.effect.clone(), own.axis.clone()));
+        let runs = [own.from_run, own.changes_from_run].into_iter().flatten();
+        runs.map(move |run| Reported {
+            effect: effect.clone(),
+            run,
+        })
+    });
+    let nameless = report.does_not_repeat.iter().filter(|own| !own.evenly);
+    let nameless = nameless.map(|own| Reported {
+        effect: None,
+        run: own.from_run,
+    });
+    named.chain(nameless).collect()
 }
 
 /// Thermometers in the remarks of a page.
@@ -155,6 +190,49 @@ pub fn has_alarm(verdict: &Verdict) -> bool {
     verdict.named().next().is_some() || verdict.is_flagged() || does_not_repeat
 }
 
+/// Parameters of the catalogue that are instants, min since the first state.
+const INSTANT: &str = "at_min";
+
+/// Whether the report gives the instant of a change: within a test cycle, or between the tests about it that show it.
+///
+/// A change without a name counts for every effect, one of a named effect for that effect and what makes the same readings.
+pub fn has_instant(verdict: &Verdict, times: &ShiftTimes, effect: &ShopEffect) -> bool {
+    let Some(change) = &effect.change else {
+        return false;
+    };
+    let is_of = |own: &Name| effect.has_name(own) || effect.same_readings.contains(own);
+    let runs = { verdict.shop.iter() }
+        .flat_map(|answer| &answer.changes)
+        .filter(|own| own.effect.as_ref().is_none_or(is_of))
+        .filter_map(|own| times.begin_s(own.run));
+    let stated = verdict
+        .named()
+        .filter(|cause| members(cause).iter().any(is_of));
+    let stated = stated.flat_map(|cause| &cause.parameters);
+    let stated = stated.filter(|(name, ..)| name == INSTANT);
+    let stated = stated.map(|(_, at_min, ..)| 60.0 * at_min);
+    let is_near = |at_s: f64| {
+        let [before_s, after_s] = change.between_s;
+        let is_between = before_s < at_s && at_s <= after_s + SAME_VISIT_S;
+        is_between || (at_s - change.at_s).abs() <= times.cycle_s
+    };
+    runs.chain(stated).any(is_near)
+}
+
+/// Whether the interval of an effect's parameter holds its size; none where there is no interval.
+pub fn holds_size(verdict: &Verdict, effect: &ShopEffect) -> Option<bool> {
+    let (name, size) = effect.parameter.as_ref()?;
+    let is_own = |cause: &&SaidCause| {
+        let own = (cause.effect.clone(), cause.axis.clone());
+        effect.has_name(&own)
+    };
+    let cause = verdict.named().find(is_own)?;
+    // Where shares of it have forms of their own, the sum is the size.
+    let find = |name: &str| cause.parameters.iter().find(|(own, ..)| own == name);
+    let (_, _, low, high) = find(&format!("whole_{name}")).or_else(|| find(name))?;
+    Some((*low..=*high).contains(size))
+}
+
 /// Relative errors of lag and growth that the page reports for a hidden effect.
 pub fn followed(verdict: &Verdict, effect: &ShopEffect) -> Option<[f64; 2]> {
     let right = effect.follow.as_ref()?;
@@ -170,7 +248,7 @@ pub fn followed(verdict: &Verdict, effect: &ShopEffect) -> Option<[f64; 2]> {
 mod tests {
     use super::*;
     use crate::sample::cause;
-    use crate::shop::truth::name;
+    use crate::shop::truth::{Change, name};
 
     fn play(same_readings: Vec<Name>) -> ShopTruth {
         ShopTruth {
@@ -188,10 +266,13 @@ mod tests {
                 d: 40.0,
                 d_alone: 40.0,
                 follow: None,
+                parameter: None,
+                change: None,
             }],
             white_um: 0.2,
             between_runs_um: 0.1,
             memory: 0.0,
+            shift: None,
         }
     }
 
@@ -210,6 +291,75 @@ mod tests {
         assert_eq!(call(&other, &truth), Call::Wrong);
         let slope = cause("scale_error", "X", Status::Named, 5.0);
         assert_eq!(call(&slope, &truth), Call::Beside);
+    }
+
+    fn shift() -> ShiftTimes {
+        ShiftTimes {
+            begins_s: vec![
+                (3, 100.0),
+                (7, 1500.0),
+                (9, 2900.0),
+                (12, 7200.0),
+                (15, 14_000.0),
+            ],
+            cycle_s: 1400.0,
+        }
+    }
+
+    fn answered(causes: Vec<SaidCause>, changes: Vec<Reported>) -> Verdict {
+        let mut verdict = crate::sample::verdict(vec![], causes, false);
+        verdict.shop = Some(Answer {
+            changes,
+            ..Answer::default()
+        });
+        verdict
+    }
+
+    #[test]
+    fn an_instant_is_right_within_a_cycle_or_between_the_tests_that_show_it() {
+        let mut effect = play(vec![]).effects.remove(0);
+        effect.change = Some(Change {
+            at_s: 1700.0,
+            between_s: [1500.0, 2900.0],
+        });
+        let run = |effect: Option<Name>, run: u32| vec![Reported { effect, run }];
+        let has = |changes| has_instant(&answered(vec![], changes), &shift(), &effect);
+        assert!(has(run(None, 9)) && has(run(Some(name("backlash", "X")), 9)));
+        assert!(!has(run(Some(name("backlash", "Y")), 9)), "another axis");
+        assert!(!has(run(None, 12)) && !has(run(None, 3)) && !has(vec![]));
+        // What circles alone show lies between two of their visits.
+        effect.change = Some(Change {
+            at_s: 3000.0,
+            between_s: [100.0, 7200.0],
+        });
+        let has = |changes| has_instant(&answered(vec![], changes), &shift(), &effect);
+        assert!(has(run(None, 12)) && !has(run(None, 15)));
+        let mut stated = cause("backlash", "X", Status::Named, 5.0);
+        stated.parameters = vec![("at_min".to_owned(), 51.0, 48.0, 54.0)];
+        assert!(has_instant(
+            &answered(vec![stated.clone()], vec![]),
+            &shift(),
+            &effect
+        ));
+        stated.parameters[0].1 = 230.0;
+        assert!(!has_instant(
+            &answered(vec![stated], vec![]),
+            &shift(),
+            &effect
+        ));
+    }
+
+    #[test]
+    fn an_interval_holds_a_size_or_not_and_is_absent_of_what_was_not_named() {
+        let mut effect = play(vec![]).effects.remove(0);
+        effect.parameter = Some(("width_um".to_owned(), 5.1));
+        let own = |value: f64| {
+            let cause = cause("backlash", "X", Status::Named, value);
+            holds_size(&answered(vec![cause], vec![]), &effect)
+        };
+        assert_eq!(own(5.0), Some(true));
+        assert_eq!(own(5.5), Some(false));
+        assert_eq!(holds_size(&answered(vec![], vec![]), &effect), None);
     }
 
     #[test]

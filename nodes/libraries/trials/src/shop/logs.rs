@@ -105,6 +105,7 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
         .map(|own| effect(&times, &sensors, &hidden, own, axis, &floor))
         .collect();
     ShopSession {
+        shift: None,
         tables: vec![Table {
             name: "log".to_owned(),
             text,
@@ -125,6 +126,7 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
             white_um: floor.white_um,
             between_runs_um: floor.between_runs_um,
             memory: floor.memory,
+            shift: None,
         },
     }
 }
@@ -469,6 +471,8 @@ fn effect(
         d: metric.d(&readings, std::slice::from_ref(&zero)),
         d_alone,
         follow: thermometer.map(|sensor| follow(&times, sensor, &readings)),
+        parameter: None,
+        change: None,
     }
 }
 

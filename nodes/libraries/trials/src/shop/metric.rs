@@ -155,7 +155,7 @@ impl Metric {
     }
 
     /// A signature as the noise within runs makes it, and the same times `C^-1`.
-    fn weighted(&self, signature: &[f64]) -> [DVector<f64>; 2] {
+    pub(super) fn weighted(&self, signature: &[f64]) -> [DVector<f64>; 2] {
         let [mut plain, mut weighted] = [(); 2].map(|()| DVector::zeros(signature.len()));
         for (range, waves, inner) in &self.runs {
             let own = DVector::from_vec(self.floor.whitened(&signature[range.clone()]));
@@ -173,25 +173,30 @@ impl Metric {
         columns.push(signature);
         let n = columns.len();
         let both: Vec<[DVector<f64>; 2]> = columns.iter().map(|c| self.weighted(c)).collect();
-        let mut gram = DMatrix::from_fn(n, n, |a, b| both[a][0].dot(&both[b][1]));
-        let before = gram.clone();
-        let whole = gram[(n - 1, n - 1)];
-        // Gram-Schmidt on the Gram matrix, the signature last.
-        for k in 0..n - 1 {
-            let own = gram[(k, k)];
-            if own <= TAKEN_OUT * before[(k, k)] || own <= 0.0 {
-                continue;
-            }
-            let row = gram.row(k).clone_owned();
-            let column = gram.column(k).clone_owned();
-            gram -= column * row / own;
+        last_left(DMatrix::from_fn(n, n, |a, b| both[a][0].dot(&both[b][1])))
+    }
+}
+
+/// Root of what the last of several columns keeps with the others taken out, from their products.
+pub(super) fn last_left(mut gram: DMatrix<f64>) -> f64 {
+    let n = gram.nrows();
+    let before = gram.clone();
+    let whole = gram[(n - 1, n - 1)];
+    // Gram-Schmidt on the Gram matrix, the signature last.
+    for k in 0..n - 1 {
+        let own = gram[(k, k)];
+        if own <= TAKEN_OUT * before[(k, k)] || own <= 0.0 {
+            continue;
         }
-        let left = gram[(n - 1, n - 1)];
-        if left > TAKEN_OUT * whole {
-            left.sqrt()
-        } else {
-            0.0
-        }
+        let row = gram.row(k).clone_owned();
+        let column = gram.column(k).clone_owned();
+        gram -= column * row / own;
+    }
+    let left = gram[(n - 1, n - 1)];
+    if left > TAKEN_OUT * whole {
+        left.sqrt()
+    } else {
+        0.0
     }
 }
 

@@ -92,6 +92,7 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
     };
     let (text, map) = write(random, layout, &run, &stops, &deviations);
     ShopSession {
+        shift: None,
         tables: vec![Table {
             name: "laser".to_owned(),
             text,
@@ -113,6 +114,7 @@ pub fn draw(random: &mut Pcg64Mcg) -> ShopSession {
             white_um: floor.white_um,
             between_runs_um: floor.between_runs_um,
             memory: floor.memory,
+            shift: None,
         },
     }
 }
@@ -337,6 +339,8 @@ impl Plan {
                 d: metric.d(&readings, std::slice::from_ref(&zero)),
                 d_alone,
                 follow: None,
+                parameter: None,
+                change: None,
             }
         };
         hidden.iter().enumerate().map(of).collect()

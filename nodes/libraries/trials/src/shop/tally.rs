@@ -11,6 +11,8 @@ use crate::detection::{MIN_D_TO_FIND, by_d, size_to_find};
 use crate::proportion::{Proportion, median};
 use crate::verdict::Verdict;
 
+mod shift;
+
 /// Edge between little and much noise that neighbouring readings share.
 const MUCH_MEMORY: f64 = 0.5;
 /// Errors of lag and growth that are allowed.
@@ -30,6 +32,47 @@ pub struct Line {
     pub target: Option<f64>,
     /// Whether more is better.
     pub is_high: bool,
+    /// The greatest share, where the target is a range.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub most: Option<f64>,
+}
+
+/// A middle value beside its target.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Middle {
+    /// What it is.
+    pub what: String,
+    /// The median; none where nothing was measured.
+    pub value: Option<f64>,
+    /// Of how many.
+    pub n: usize,
+    /// The target.
+    pub target: f64,
+    /// Whether more is better.
+    pub is_high: bool,
+}
+
+impl Middle {
+    fn of(what: &str, values: Vec<f64>, target: f64, is_high: bool) -> Self {
+        Self {
+            what: what.to_owned(),
+            n: values.len(),
+            value: median(values),
+            target,
+            is_high,
+        }
+    }
+
+    /// Whether the target is met; none where nothing was measured.
+    #[must_use]
+    pub fn is_met(&self) -> Option<bool> {
+        let value = self.value?;
+        Some(if self.is_high {
+            value >= self.target
+        } else {
+            value <= self.target
+        })
+    }
 }
 
 impl Line {
@@ -40,6 +83,15 @@ impl Line {
             interval: count.wilson(),
             target,
             is_high,
+            most: None,
+        }
+    }
+
+    /// Shares between two ends are met.
+    fn within(what: &str, count: Proportion, [least, most]: [f64; 2]) -> Self {
+        Self {
+            most: Some(most),
+            ..Self::of(what, count, Some(least), true)
         }
     }
 
@@ -54,7 +106,9 @@ impl Line {
         } else {
             share <= target
         };
-        let holds = (self.interval[0]..=self.interval[1]).contains(&target);
+        let is_met = is_met && self.most.is_none_or(|most| share <= most);
+        let is_inside = |edge: &f64| (self.interval[0]..=self.interval[1]).contains(edge);
+        let holds = is_inside(&target) || self.most.as_ref().is_some_and(is_inside);
         match (is_met, holds) {
             (_, true) => "open",
             (true, false) => "met",
@@ -95,6 +149,9 @@ pub struct ShopTally {
     pub refused: Vec<(String, usize)>,
     /// Median and longest time of a diagnosis, s.
     pub times_s: [Option<f64>; 2],
+    /// Middle values with targets.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub middles: Vec<Middle>,
 }
 
 /// A verdict with its truth.
@@ -131,6 +188,11 @@ impl ShopTally {
                 all.iter()
                     .filter_map(|(verdict, _)| verdict.refused.clone()),
             ),
+            middles: if arm == Arm::ShopShift {
+                shift::middles(&answered)
+            } else {
+                vec![]
+            },
             times_s: [median(times.clone()), times.into_iter().reduce(f64::max)],
         }
     }
@@ -169,6 +231,9 @@ fn lines(arm: Arm, all: &[Judged<'_>], answered: &[Judged<'_>]) -> Vec<Line> {
     lines.extend(of_effects(&large));
     if arm == Arm::ShopLogs {
         lines.extend(of_temperatures(&large));
+    }
+    if arm == Arm::ShopShift {
+        lines.extend(shift::lines(answered));
     }
     lines
 }

@@ -30,6 +30,38 @@ pub struct ShopTruth {
     pub between_runs_um: f64,
     /// What a reading keeps of the noise of the one before.
     pub memory: f64,
+    /// When a shift's runs were made.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shift: Option<ShiftTimes>,
+}
+
+/// When the runs of a shift were made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShiftTimes {
+    /// Number and begin of each test, s since the first state of the bag.
+    pub begins_s: Vec<(u32, f64)>,
+    /// Longest time from one block cycle to the next, s.
+    pub cycle_s: f64,
+}
+
+impl ShiftTimes {
+    /// When a run began, s since the first state of the bag.
+    #[must_use]
+    pub fn begin_s(&self, run: u32) -> Option<f64> {
+        let own = self.begins_s.iter().find(|(number, _)| *number == run);
+        own.map(|(_, begin_s)| *begin_s)
+    }
+}
+
+/// When something changed during a shift.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    /// The instant, s since the first state of the bag.
+    pub at_s: f64,
+    /// Begins of the last test before it and of the first one after it, of those that show the effect, s.
+    pub between_s: [f64; 2],
 }
 
 /// One hidden effect.
@@ -59,6 +91,12 @@ pub struct ShopEffect {
     /// The temperature that it follows.
     #[serde(default)]
     pub follow: Option<Follow>,
+    /// The catalogue's parameter that has a size of this effect, and that size; where the form is the catalogue's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parameter: Option<(String, f64)>,
+    /// When it began, where it was not there from the begin.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub change: Option<Change>,
 }
 
 impl ShopEffect {
