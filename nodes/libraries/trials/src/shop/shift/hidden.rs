@@ -1,8 +1,11 @@
 //! What a shift can hide, as readings of size 1 on its circles and touches.
 //!
-//! A motion (`machine_motion`) is there always, from an instant on, or grows from one. What warms moves the tip in the
-//! direction of a touch; a screw that warms also makes circles oval. A reference that shifts moves one axis at all
+//! A motion (`machine_motion`) is there always, from an instant on, or grows from one; lost motion of a worn nut varies along
+//! its axis. What warms moves the tip in the direction of a touch; a screw that warms also makes circles oval. A control may
+//! compensate a part of the spindle's growth already, without its lag. A reference that shifts moves one axis at all
 //! blocks, a clamp that slips or a block that creeps moves one face of one block.
+
+use std::f64::consts::TAU;
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -10,9 +13,9 @@ use rand_pcg::Pcg64Mcg;
 use super::super::ballbar::LETTERS;
 use super::super::dice::log_uniform;
 use super::super::heat::{Behind, Node};
-use super::super::machine_motion::Motion;
+use super::super::machine_motion::{Circle, Motion};
 use super::super::truth::{Change, Name, name};
-use super::timetable::{Entry, SHIFT_S, Timetable, Touched, Turn};
+use super::timetable::{CENTRE_MM, Entry, SHIFT_S, Timetable, Touched, Turn};
 use super::warmth::{Warmth, at, id_at};
 
 /// Instants at which something begins, as shares of the shift.
@@ -23,6 +26,10 @@ const LAG_S: [f64; 2] = [120.0, 5400.0];
 const CREEPS_S: [f64; 2] = [600.0, 7200.0];
 /// Time in which lubrication fades, s.
 const FADES_S: [f64; 2] = [1800.0, 7200.0];
+/// Waves of a worn nut, mm.
+const WEAR_MM: [f64; 2] = [80.0, 600.0];
+/// What a control takes off the growth of a spindle.
+const COMPENSATED: [f64; 2] = [0.3, 0.8];
 /// Where the fixed bearing of a screw is, mm from the machine's zero.
 const FIXED_MM: [f64; 2] = [300.0, 450.0];
 
@@ -76,6 +83,26 @@ pub enum Kind {
     Creep(usize, usize, f64),
 }
 
+/// How lost motion varies along an axis: share, wave, rad/mm, and phase.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wear([f64; 3]);
+
+impl Wear {
+    fn draw(random: &mut Pcg64Mcg) -> Self {
+        Self([
+            random.random_range(0.2..0.7),
+            TAU / log_uniform(random, WEAR_MM),
+            random.random_range(0.0..TAU),
+        ])
+    }
+
+    /// Width at a place over the width on average.
+    fn at(self, place_mm: f64) -> f64 {
+        let Self([share, wave, phase]) = self;
+        1.0 + share * (wave * place_mm + phase).sin()
+    }
+}
+
 /// An effect of size 1.
 #[derive(Clone, Debug)]
 pub struct Effect {
@@ -85,6 +112,10 @@ pub struct Effect {
     pub begins: Begins,
     /// What grows, K above its begin, every kept instant.
     grown_k: Vec<f64>,
+    /// How lost motion varies.
+    wear: Option<Wear>,
+    /// What a control takes off already, K for K of the temperature itself.
+    compensated: f64,
 }
 
 impl Effect {
@@ -99,10 +130,14 @@ impl Effect {
             Motion::Reversal(..) if chance < 0.5 => Begins::Grows(from_s, over_s),
             _ => Begins::Always,
         };
+        let wear = Wear::draw(random);
+        let is_worn = matches!(motion, Motion::Backlash(..)) && random.random::<f64>() < 0.4;
         Self {
             kind: Kind::Drive(motion),
             begins,
             grown_k: vec![],
+            wear: is_worn.then_some(wear),
+            compensated: 0.0,
         }
     }
 
@@ -125,16 +160,22 @@ impl Effect {
             _ => Begins::Always,
         };
         let lag_s = log_uniform(random, LAG_S);
+        let takes_off = random.random_range(COMPENSATED[0]..COMPENSATED[1]);
+        let is_compensated = which == 0 && random.random::<f64>() < 0.3;
+        let compensated = if is_compensated { takes_off } else { 0.0 };
         let grown_k = kind.node().map(|node| {
             let (face, skipped) = warmth.with_past(node);
             let mean = Behind::draw(random, lag_s).mean(&face);
-            let from = mean[skipped];
-            mean[skipped..].iter().map(|degc| degc - from).collect()
+            let left = mean.iter().zip(&face).map(|(m, f)| m - compensated * f);
+            let left: Vec<f64> = left.skip(skipped).collect();
+            left.iter().map(|degc| degc - left[0]).collect()
         });
         Self {
             kind,
             begins,
             grown_k: grown_k.unwrap_or_default(),
+            wear: None,
+            compensated,
         }
     }
 
@@ -152,7 +193,7 @@ impl Effect {
         let middle_s = 0.5 * (turn.span_s[0] + turn.span_s[1]);
         let share = self.begins.share(middle_s);
         let (one, size) = match &self.kind {
-            Kind::Drive(motion) => (motion.radial_um(&turn.circle), share),
+            Kind::Drive(motion) => (self.worn_um(motion, turn), share),
             Kind::Screw(axis, _) => {
                 let scale = Motion::Scale(*axis).radial_um(&turn.circle);
                 (scale, at(&self.grown_k, middle_s))
@@ -160,6 +201,26 @@ impl Effect {
             _ => return vec![0.0; turn.circle.angles.len()],
         };
         one.iter().map(|value| size * value).collect()
+    }
+
+    /// What a motion makes of a circle, with the wear of its nut.
+    fn worn_um(&self, motion: &Motion, turn: &Turn) -> Vec<f64> {
+        let mut one = motion.radial_um(&turn.circle);
+        let (Some(wear), Motion::Backlash(axis, ..)) = (self.wear, motion) else {
+            return one;
+        };
+        let Circle {
+            axes, radius_mm, ..
+        } = turn.circle;
+        for (value, angle) in one.iter_mut().zip(&turn.circle.angles) {
+            let along = if axes[0] == *axis {
+                angle.cos()
+            } else {
+                angle.sin()
+            };
+            *value *= wear.at(CENTRE_MM[*axis] + radius_mm * along);
+        }
+        one
     }
 
     /// How much further along its axis the tip is, µm.
@@ -171,7 +232,10 @@ impl Effect {
         match &self.kind {
             // The tip stays behind by half of the play.
             Kind::Drive(Motion::Backlash(axis, ..)) => {
-                -0.5 * share * of(axis) * block.senses[touch.axis]
+                let width = self
+                    .wear
+                    .map_or(1.0, |wear| wear.at(block.corner_mm[*axis]));
+                -0.5 * width * share * of(axis) * block.senses[touch.axis]
             }
             Kind::Drive(Motion::Squareness([first, second])) => {
                 1e-3 * share * of(first) * block.corner_mm[*second]
@@ -253,7 +317,12 @@ impl Effect {
             (Kind::Drive(_), Begins::Grows(..)) => " that grows",
             _ => "",
         };
-        format!("{kind}{since}")
+        let form = match (self.wear, self.compensated > 0.0) {
+            (Some(_), _) => " that varies",
+            (_, true) => " that a control compensates",
+            _ => "",
+        };
+        format!("{kind}{form}{since}")
     }
 
     /// Least and greatest size, and the unit.
@@ -288,7 +357,7 @@ impl Effect {
                 Some(("angle_urad", sign))
             }
             Kind::Drive(Motion::Scale(_)) => Some(("scale_um_per_m", 1.0)),
-            Kind::Drive(Motion::Backlash(..)) => Some(("width_um", 1.0)),
+            Kind::Drive(Motion::Backlash(..)) if self.wear.is_none() => Some(("width_um", 1.0)),
             Kind::Drive(Motion::Slow(_)) => Some(("time_ms", 1.0)),
             Kind::Reference(_) => Some(("shift_um", 1.0)),
             _ => None,
@@ -326,6 +395,8 @@ mod tests {
             kind: Kind::Slip(0, 1),
             begins: Begins::At(7000.0),
             grown_k: vec![],
+            wear: None,
+            compensated: 0.0,
         };
         let readings = slip.readings_um(&table);
         let circles: usize = table.turns().map(|turn| turn.circle.angles.len()).sum();
@@ -340,6 +411,17 @@ mod tests {
     }
 
     #[test]
+    fn a_worn_nut_has_its_width_on_average_and_less_or_more_from_place_to_place() {
+        let wear = Wear::draw(&mut Pcg64Mcg::seed_from_u64(6));
+        let widths: Vec<f64> = (0..10_000).map(|k| wear.at(f64::from(k))).collect();
+        let mean = widths.iter().sum::<f64>() / 1e4;
+        let least = widths
+            .iter()
+            .fold(1.0_f64, |least, width| least.min(*width));
+        assert!((mean - 1.0).abs() < 0.03 && (0.29..0.81).contains(&least));
+    }
+
+    #[test]
     fn play_from_an_instant_on_shows_on_touches_and_on_later_circles() {
         let mut random = Pcg64Mcg::seed_from_u64(3);
         let table = Timetable::draw(&mut random);
@@ -348,6 +430,8 @@ mod tests {
             kind: Kind::Drive(Motion::lost_motion(&mut random, axis)),
             begins: Begins::At(9000.0),
             grown_k: vec![],
+            wear: None,
+            compensated: 0.0,
         };
         for turn in table.turns() {
             let one = play.on_circle_um(turn);

@@ -216,8 +216,9 @@ impl Columns<'_> {
 
     /// What begins between two block cycles: references, coolant, the stylus.
     fn steps(&mut self) {
-        let begins: Vec<f64> = { self.table.cycles().skip(1) }
-            .map(|cycle| cycle.span_s[0] - 1.0)
+        // Coolant flows as soon as a cycle is over, so that it has come to its end at the next one.
+        let begins: Vec<f64> = { self.table.cycles() }
+            .map(|cycle| cycle.span_s[1] + 1.0)
             .collect();
         let step = |from_s: &f64, axis: usize| {
             let from_s = *from_s;

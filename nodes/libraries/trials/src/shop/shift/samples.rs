@@ -1,6 +1,6 @@
 //! A shift as the samples that a recorder gets: a bag as of any other machine.
 //!
-//! On circles the states come every 20 ms and the bar is read in between, on approaches every 50 ms; in production
+//! On circles the states come every 20 ms and the bar is read in between, on approaches every 10 ms; in production
 //! once a second, in rest every two.
 
 use std::f64::consts::TAU;
@@ -19,15 +19,13 @@ use super::super::ballbar::LETTERS;
 use super::super::dice::heavy;
 use super::super::heat::KEPT_S;
 use super::super::layout::START_S;
-use super::timetable::{AHEAD_RAD, Cycle, Entry, Timetable, Touched, Turn};
+use super::timetable::{AHEAD_RAD, CENTRE_MM, Cycle, Entry, Timetable, Touched, Turn};
 use super::warmth::{Warmth, at};
 use crate::measurement::Sample;
 
-/// Middle of the circles, mm.
-pub const CENTRE_MM: [f64; 3] = [0.0, 0.0, 190.0];
 /// Spacing of states on circles, on approaches, in production, at rest, s.
 const TICK_S: f64 = 0.02;
-const APPROACH_TICK_S: f64 = 0.05;
+const APPROACH_TICK_S: f64 = 0.01;
 const PRODUCTION_TICK_S: f64 = 1.0;
 const REST_TICK_S: f64 = 2.0;
 /// Spacing of states on the way from one touch to the next, s.

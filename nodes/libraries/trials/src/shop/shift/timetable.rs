@@ -13,6 +13,8 @@ use super::super::ballbar::{Mounted, PLANES};
 use super::super::dice::log_uniform;
 use super::super::machine_motion::Circle;
 
+/// Middle of the circles, mm.
+pub const CENTRE_MM: [f64; 3] = [0.0, 0.0, 190.0];
 /// Length of a shift, s.
 pub const SHIFT_S: f64 = 4.0 * 3600.0;
 /// Shortest and longest time between two block cycles, s.
@@ -123,9 +125,9 @@ impl Timetable {
             table,
         };
         let every_s = random.random_range(EVERY_S[0]..EVERY_S[1]);
-        let mut next_s = planned.now_s + every_s;
         planned.visit();
         planned.cycle();
+        let mut next_s = planned.now_s + every_s;
         while next_s < SHIFT_S {
             if planned.visit == 1 && next_s > 0.45 * SHIFT_S {
                 planned.produce(next_s - planned.visit_s());
@@ -137,8 +139,8 @@ impl Timetable {
             next_s = planned.now_s + every_s * random.random_range(0.85..1.15);
         }
         planned.produce(SHIFT_S);
-        planned.visit();
         planned.cycle();
+        planned.visit();
         planned.table
     }
 
