@@ -28,8 +28,8 @@ const TICK_S: f64 = 0.02;
 const APPROACH_TICK_S: f64 = 0.01;
 const PRODUCTION_TICK_S: f64 = 1.0;
 const REST_TICK_S: f64 = 2.0;
-/// Spacing of states on the way from one touch to the next, s.
-const WAY_TICK_S: f64 = 0.5;
+/// The same on the way from one touch to the next: more than a quarter of a second is a hole in a motion.
+const WAY_TICK_S: f64 = 0.2;
 /// Ball, stand-off and feed of a touch, mm and mm/s.
 pub const BALL_MM: f64 = 3.0;
 const STANDOFF_MM: f64 = 2.0;
@@ -241,8 +241,7 @@ impl Written<'_> {
         };
         self.put(touch.at_s, Sample::Trigger(trigger));
         // Back to the stand-off, and up beside the block.
-        self.place_mm[touch.axis] -= sense * STANDOFF_MM;
-        self.state(touch.at_s + 0.5);
+        self.go(before(approach_s), touch.at_s + 0.5);
         let mut above_mm = self.place_mm;
         above_mm[2] = (block.corner_mm[2] + 40.0).max(above_mm[2]);
         self.go(above_mm, touch.at_s + 1.5);
