@@ -129,7 +129,8 @@ fn hide(
     Hidden { motion, size, one }
 }
 
-fn counted(n: usize, what: &str) -> String {
+/// So many of something, in words.
+pub(super) fn counted(n: usize, what: &str) -> String {
     let plural = if n == 1 { "" } else { "s" };
     format!("{n} {what}{plural}")
 }

@@ -10,14 +10,14 @@ use rand::Rng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
 
-use super::ballbar::{MIN_D_APART, look_alikes, motions};
+use super::ballbar::{MIN_D_APART, counted, look_alikes, motions};
 use super::dice::{how_many, log_uniform, sign};
 use super::metric::Floor;
 use super::truth::{Name, ShiftTimes, ShopEffect, ShopTruth};
 use super::{Shift, ShopSession};
 
 use hidden::{Effect, Kind};
-use imitators::{has_imitators, imitators, is_read};
+use imitators::{Imitator, has_imitators, imitators};
 use samples::{INSET_MM, samples};
 use size::{Sizing, Weighed, courses};
 use timetable::Timetable;
@@ -94,18 +94,21 @@ fn truth(
     floors: &[Floor; 2],
     effects: Vec<ShopEffect>,
 ) -> ShopTruth {
-    let planes = table.turns().map(|turn| turn.plane);
-    let planes: std::collections::BTreeSet<usize> = planes.collect();
-    let circles = table.turns().filter(|turn| turn.visit == 1).count();
+    let planes = table.tables.chunk_by(|a, b| a.plane == b.plane).count();
+    let feeds = table.tables.len() / planes.max(1);
     ShopTruth {
-        session: format!("{} block cycles", table.cycles().count()),
-        layout: format!(
-            "{} thermometers, {} blocks",
-            warmth.thermometers.len(),
-            table.blocks.len()
+        session: format!(
+            "shift, {} and {}",
+            counted(planes, "plane"),
+            counted(feeds, "feed")
         ),
-        repeats: circles / 2,
-        places: planes.len(),
+        layout: format!(
+            "{} and {}",
+            counted(table.blocks.len(), "block"),
+            counted(warmth.thermometers.len(), "thermometer")
+        ),
+        repeats: table.cycles().count(),
+        places: planes,
         effects,
         white_um: floors[0].white_um,
         between_runs_um: floors[0].between_runs_um,
@@ -183,8 +186,7 @@ fn effects(
         let others = || hidden.iter().enumerate().filter(|(k, _)| *k != own);
         let taken_out: Vec<&Weighed> = others().map(|(_, other)| &other.weighed).collect();
         let d_alone = sizing.d(weighed, &taken_out);
-        let mut names = effect.names();
-        names.retain(|name| is_read(warmth, name));
+        let (names, besides) = names(effect, &known, sizing, weighed);
         let mut same: Vec<Name> = match &effect.kind {
             Kind::Drive(motion) => look_alikes(&table.tables, motion),
             _ if has_imitators(effect) => {
@@ -198,13 +200,13 @@ fn effects(
         if d_alone < MIN_D_APART && !names.is_empty() {
             same.extend(others().flat_map(|(_, other)| other.effect.names()));
         }
-        same.retain(|other| !names.contains(other));
+        same.retain(|other| !names.contains(other) && !besides.contains(other));
         same.sort();
         same.dedup();
         ShopEffect {
             what: effect.words(),
             names,
-            besides: vec![],
+            besides,
             same_readings: same,
             size: *size,
             unit: effect.sizes().1.to_owned(),
@@ -218,6 +220,24 @@ fn effects(
         }
     };
     (0..hidden.len()).map(of).collect()
+}
+
+/// Names by which the catalogue describes an effect, and true ones whose form does not: without a thermometer beside it
+/// the growth of a spindle follows time alone.
+fn names(
+    effect: &Effect,
+    known: &[Imitator],
+    sizing: &Sizing,
+    own: &Weighed,
+) -> (Vec<Name>, Vec<Name>) {
+    if !has_imitators(effect) {
+        return (effect.names(), vec![]);
+    }
+    let describes = |wanted: &Name| {
+        let imitator = known.iter().find(|it| it.name() == wanted);
+        imitator.is_some_and(|it| it.describes(sizing, own))
+    };
+    effect.names().into_iter().partition(describes)
 }
 
 /// Noise of every reading, µm.

@@ -18,7 +18,7 @@ pub struct ShopTruth {
     pub session: String,
     /// The layout of its tables.
     pub layout: String,
-    /// Cycles, circles of one kind, or warm-ups.
+    /// Cycles, circles of one kind, warm-ups, or block cycles of a shift.
     pub repeats: usize,
     /// Targets, planes or thermometers.
     pub places: usize,

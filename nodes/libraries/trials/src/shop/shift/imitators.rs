@@ -11,10 +11,12 @@ use super::super::truth::{Name, name};
 use super::hidden::Effect;
 use super::size::{Sizing, Weighed};
 use super::timetable::{Block, Timetable, Touched};
-use super::warmth::{Warmth, at, id_at};
+use super::warmth::{Warmth, at};
 
 /// Below this D apart from an alternative both make the same readings.
 const MAX_D_OF_SAME: f64 = 3.0;
+/// What the catalogue's form of an effect may leave of it, as a share of D: more is another form.
+const MAX_SHARE_LEFT: f64 = 0.35;
 /// Lags of what follows a thermometer, min.
 const LAGS_MIN: [f64; 6] = [0.0, 5.0, 15.0, 40.0, 90.0, 180.0];
 /// Fast and slow time constants of a spindle, min.
@@ -33,13 +35,25 @@ pub struct Imitator {
 }
 
 impl Imitator {
-    /// Whether it makes the same readings as `own`, others being taken out.
-    pub fn is_same(&self, sizing: &Sizing, own: &Weighed, others: &[&Weighed]) -> bool {
-        self.variants.iter().any(|variant| {
+    /// D of what its best variant leaves of `own`, others being taken out.
+    fn left(&self, sizing: &Sizing, own: &Weighed, others: &[&Weighed]) -> f64 {
+        let left = self.variants.iter().map(|variant| {
             let mut taken_out = others.to_vec();
             taken_out.extend(variant);
-            sizing.d(own, &taken_out) < MAX_D_OF_SAME
-        })
+            sizing.d(own, &taken_out)
+        });
+        left.fold(f64::MAX, f64::min)
+    }
+
+    /// Whether it makes the same readings as `own`, others being taken out.
+    pub fn is_same(&self, sizing: &Sizing, own: &Weighed, others: &[&Weighed]) -> bool {
+        self.left(sizing, own, others) < MAX_D_OF_SAME
+    }
+
+    /// Whether its form is near enough to that of `own` to be its name.
+    pub fn describes(&self, sizing: &Sizing, own: &Weighed) -> bool {
+        let whole = sizing.d(own, &[]);
+        self.left(sizing, own, &[]) < MAX_D_OF_SAME.max(MAX_SHARE_LEFT * whole)
     }
 
     /// Its name.
@@ -262,11 +276,4 @@ impl Columns<'_> {
 pub const fn has_imitators(effect: &Effect) -> bool {
     use super::hidden::Kind::{Creep, Drive, Slip};
     !matches!(effect.kind, Drive(_) | Slip(..) | Creep(..))
-}
-
-/// Name of a thermometer that is not there, for the names of an effect.
-pub fn is_read(warmth: &Warmth, own: &Name) -> bool {
-    let is_of = |node: Node| own.1 == id_at(node);
-    let read = warmth.thermometers.iter().any(|it| is_of(it.node));
-    own.0 != "thermal_shift" || read
 }
