@@ -278,7 +278,7 @@ impl Effect {
             Entry::Production(..) => false,
         };
         let begins = || table.entries.iter().filter(shows).map(|it| it.span_s()[0]);
-        let before_s = begins().filter(|begin_s| *begin_s < at_s).last();
+        let before_s = begins().rfind(|begin_s| *begin_s < at_s);
         let after_s = begins().find(|begin_s| *begin_s >= at_s);
         Some(Change {
             at_s,
