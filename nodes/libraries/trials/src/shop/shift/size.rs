@@ -13,7 +13,7 @@ use super::super::metric::{Floor, Metric, last_left};
 use super::timetable::Timetable;
 
 /// Keeps a set-up that no reading has from being divided by.
-const RIDGE: f64 = 1e-9;
+const SET_UP_RIDGE: f64 = 1e-9;
 
 /// A column of readings, ready for products (1).
 pub struct Weighed {
@@ -47,7 +47,7 @@ impl Sizing {
         let weighed: Vec<[DVector<f64>; 2]> = columns.iter().map(|c| sizing.whole(c)).collect();
         let mut floats = DMatrix::from_fn(n, n, |a, b| weighed[a][0].dot(&weighed[b][1]));
         for k in 0..n {
-            floats[(k, k)] *= 1.0 + RIDGE;
+            floats[(k, k)] *= 1.0 + SET_UP_RIDGE;
         }
         let weighted: Vec<DVector<f64>> = weighed.into_iter().map(|[_, own]| own).collect();
         sizing.set_up = DMatrix::from_columns(&weighted);

@@ -20,7 +20,7 @@ pub const SHIFT_S: f64 = 4.0 * 3600.0;
 /// Shortest and longest time between two block cycles, s.
 const EVERY_S: [f64; 2] = [900.0, 1800.0];
 /// Time that a person needs to mount the bar in another plane, s.
-const MOUNTING_S: f64 = 150.0;
+const MOUNTING_IN_SHIFT_S: f64 = 150.0;
 /// Rest before a circle, s.
 const REST_S: f64 = 3.0;
 /// Time from one touch to the next, s.
@@ -221,7 +221,7 @@ impl Planned {
         let turning_s =
             circles.map(|circle| REST_S + (TAU + AHEAD_RAD) * circle.radius_mm / circle.feed_mm_s);
         let mountings = tables.chunk_by(|a, b| a.plane == b.plane).count() + 1;
-        turning_s.sum::<f64>() + MOUNTING_S * mountings as f64
+        turning_s.sum::<f64>() + MOUNTING_IN_SHIFT_S * mountings as f64
     }
 
     fn visit(&mut self) {
@@ -229,7 +229,7 @@ impl Planned {
         let mut plane_before = None;
         for mounted in self.table.tables.clone() {
             if plane_before.replace(mounted.plane) != Some(mounted.plane) {
-                self.now_s += MOUNTING_S;
+                self.now_s += MOUNTING_IN_SHIFT_S;
             }
             for circle in mounted.circles {
                 let run = self.next_run();
@@ -246,7 +246,7 @@ impl Planned {
                 }));
             }
         }
-        self.now_s += MOUNTING_S;
+        self.now_s += MOUNTING_IN_SHIFT_S;
     }
 
     fn cycle(&mut self) {
