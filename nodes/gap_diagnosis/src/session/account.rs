@@ -59,7 +59,7 @@ pub enum Reason {
     Cut,
     /// An end without a begin.
     NotBegun,
-    /// A segment that came long after its stamp, or before the samples of its time.
+    /// A segment that came long after its stamp.
     SegmentLate,
     /// Ticks beyond what a run may hold.
     TooLong,
@@ -140,7 +140,7 @@ impl Reason {
             Self::Cut => "segments were cut; they are used up to there",
             Self::NotBegun => "segments ended whose begin was not recorded",
             Self::SegmentLate => {
-                "segments came more than 2 s after their stamp or before the samples of it, or bear that of another clock; they begin and end when they came"
+                "segments came more than 2 s after their stamp, or bear that of another clock; they begin and end when they came"
             }
             Self::TooLong => "samples were beyond what one run may hold",
             Self::TooMuch => {

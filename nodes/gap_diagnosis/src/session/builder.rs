@@ -438,7 +438,7 @@ impl SessionBuilder {
             *number = number.saturating_add(base);
             *greatest = (*greatest).max(*number);
         }
-        if self.recent.is_of_another_time(segment.at) && is_test(segment.kind) {
+        if self.recent.is_late(segment.at) && is_test(segment.kind) {
             self.account.note(Reason::SegmentLate);
         }
         self.awaits_touches = false;

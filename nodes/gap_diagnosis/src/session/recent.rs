@@ -39,10 +39,9 @@ impl Recent {
         (ahead_s.abs() <= LATE_S).then_some(at)
     }
 
-    /// Whether a stamp is older than any message may be, or ahead of the samples by as much.
-    pub(super) fn is_of_another_time(&self, at: Stamp<Host>) -> bool {
-        self.ahead_s(at)
-            .is_some_and(|ahead_s| ahead_s.abs() > LATE_S)
+    /// Whether a stamp is older than any message may be.
+    pub(super) fn is_late(&self, at: Stamp<Host>) -> bool {
+        self.ahead_s(at).is_some_and(|ahead_s| ahead_s < -LATE_S)
     }
 
     /// How far a stamp is ahead of the newest sample.
