@@ -128,7 +128,7 @@ pub fn make_found(folder: &Path) -> Result<()> {
 /// The machine file with the named effects that a diagnosis wrote.
 ///
 /// # Errors
-/// When it is none.
+/// When the file cannot be read, or is no machine file.
 pub fn read_found(folder: &Path) -> Result<MachineFile> {
     let text = text_file::yaml(&folder.join(FOUND))?;
     Ok(MachineFile::parse(&text, FOUND)?)
@@ -264,7 +264,7 @@ pub fn left_um((machine, session): &Recording) -> Option<f64> {
 /// The session of samples of a machine, or the reason why it cannot be made.
 ///
 /// # Errors
-/// When the machine file is none.
+/// When the text is no machine file.
 pub fn taken(machine_text: &str, samples: &Samples) -> Result<Result<Recording, String>> {
     let machine = MachineFile::parse(machine_text, "machine.yaml")?;
     let mut builder = SessionBuilder::new(&machine, SessionConfig::default())?;

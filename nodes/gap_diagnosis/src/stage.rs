@@ -9,9 +9,9 @@
 //! then are repeats enough, the noise from before is kept. Until there are enough of any, all runs are diagnosed by
 //! their own repeats.
 //!
-//! A cycle alone does not see what goes with hours, as the warmth of a screw. So all runs are diagnosed beside it, as
-//! `abbe diagnose` does with a bag of them, and that report is the one that is told; but for what the last cycle names
-//! and all runs do not yet: then the cycle's is, for as long as a cycle lasts. So it is where a size is another one now.
+//! A cycle alone does not show what takes hours, as a screw that warms. So all runs are diagnosed as well, as
+//! `abbe diagnose` would a bag of them, and that report is published. The cycle's own is published where it names an
+//! effect at another size, and for one more cycle where it names one that all runs do not show yet.
 //!
 //! An effect is told of when it is named and stands well above what can be seen; one that sets in at an instant only where
 //! runs from before say what noise is: else a few runs after any change of the machine look like one. A rest that no effect explains is vaguer: it is told of when a whole cycle
@@ -348,8 +348,8 @@ impl GapDiagnosisStage {
         self.tell_left_out(out);
     }
 
-    /// What is told: of all runs, but for what the last cycle names and they do not, for as long as a cycle lasts. What has
-    /// another size than over all runs has that of the cycle.
+    /// The report that is published: of all runs, or of the last cycle where that names an effect at another size, or, for one
+    /// more cycle, an effect that all runs do not show yet.
     fn told_of(&mut self, cycle: OfRuns, whole: Option<OfRuns>, closed: usize) -> OfRuns {
         let Some(whole) = whole else {
             return cycle;

@@ -1,4 +1,4 @@
-//! What the node tells of a diagnosis: the report as a message, and new effects in words.
+//! What the node publishes of a diagnosis: the report as a message, and new effects in words.
 
 use metrology::sample::{GapCause, GapParameter, GapStatus, GapSummary};
 use metrology::{Host, Stamp};
