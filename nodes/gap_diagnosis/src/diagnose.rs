@@ -24,14 +24,14 @@ use crate::noise::unrepeated;
 use crate::noise::whiteness;
 use crate::noise::{self, Noise, Readings};
 use crate::report::figures::{Figures, Note};
-use crate::report::{DoesNotRepeat, GapReport, NotExcited, OverSession, SCHEMA};
+use crate::report::{DoesNotRepeat, Gap, GapReport, NotExcited, OverSession, SCHEMA};
 use crate::report::{floor, follows, localise, places};
 use crate::search::families::Slot;
 use crate::search::isolability;
 use crate::search::regression::Regression;
 use crate::search::rows::Rows;
 use crate::search::searched::{Base, Searched, less, told};
-use crate::session::changes::{self, Change};
+use crate::session::changes::{self, Change, moved};
 use crate::session::fewer::{MIN_STATIONS_KEPT, fewer};
 use crate::session::log;
 use crate::session::over_session;
@@ -88,14 +88,13 @@ pub fn diagnose_against(
 ) -> Result<Diagnosis, GapError> {
     let kinds = considered(config)?;
     // A set-up that seems to move again and again may be a machine that grows.
-    let explains = |grown: &Diagnosis| grown.report.does_not_repeat.is_empty();
-    prepared(
-        machine,
-        [session, quiet],
-        config,
-        explains,
-        |base, notes| base.diagnosis(&kinds, config, notes),
-    )
+    let leaves = |grown: &Diagnosis, from_run: u32| {
+        let left = &grown.report.does_not_repeat;
+        left.iter().any(|own| own.from_run == from_run)
+    };
+    prepared(machine, [session, quiet], config, leaves, |base, notes| {
+        base.diagnosis(&kinds, config, notes)
+    })
 }
 
 /// The signatures of the catalogue on the runs that a diagnosis is fitted to, before it has found anything.
@@ -121,7 +120,7 @@ pub(crate) fn first_stack<R>(
         machine,
         [session; 2],
         config,
-        |_| false,
+        |_, _| true,
         |base, _| {
             let split = split::split(base.session, config.hold_out);
             let stack = base.stack(&split.fit, base.noise, &FormError::base(config));
@@ -130,13 +129,13 @@ pub(crate) fn first_stack<R>(
     )
 }
 
-/// Takes the residuals and their noise, and goes on with them. Where the set-up seems to move, it is taken for one that stands
-/// first; what comes of that holds if it is `enough`.
+/// Takes the residuals and their noise, and goes on with them. Where a set-up or what is touched seems to move, it is taken for
+/// one that stands first; what comes of that holds if it `leaves` no change from such a run on.
 fn prepared<R>(
     machine: &MachineFile,
     [session, quiet]: [&Session; 2],
     config: &GapConfig,
-    enough: impl Fn(&R) -> bool,
+    leaves: impl Fn(&R, u32) -> bool,
     then: impl Fn(&Base<'_>, Vec<Note>) -> R,
 ) -> Result<R, GapError> {
     config.check()?;
@@ -158,7 +157,7 @@ fn prepared<R>(
     let of_session = own_noise.then(|| changes_of(session, &rows, &residual, config));
     let changes = of_session.unwrap_or_default();
     let set_ups = changes::set_ups(session);
-    let of_set_up = |session: &Session| -> Result<R, GapError> {
+    let of_set_up = |session: &Session, moved: &[&Change]| -> Result<R, GapError> {
         let noise = if own_noise {
             noise_of(machine, session, stations, &residual, &changes, config)
         } else {
@@ -181,16 +180,18 @@ fn prepared<R>(
             changes: changes.clone(),
             set_ups: set_ups.clone(),
             floats: vec![],
+            moved: moved::of(session, moved.iter().copied()),
             is_of_targets: false,
         };
         let base = base.floating(config);
         Ok(then(&base, of_begin(&base, &rows, of)))
     };
-    let Some(anew) = changes::set_up_anew(session, &changes, config) else {
-        return of_set_up(session);
+    let anew = changes::set_up_anew(session, &changes, config);
+    let is_left = |of: &R, change: &Change| {
+        let first = &session.runs[change.between[1]];
+        leaves(of, first.segment.run)
     };
-    let one = Some(of_set_up(session)?).filter(enough);
-    one.map_or_else(|| of_set_up(&anew), Ok)
+    moved::standing_first((session, anew.as_ref()), &changes, of_set_up, is_left)
 }
 
 /// What a reader should know before anything is searched; `of` runs were recorded.
@@ -281,7 +282,6 @@ impl<'a> Base<'a> {
         let noise_check = guard::judge(&inflation, config, has_repeats, &mut notes);
         found.add_check(&noise_check);
         scattered.add_check(&noise_check);
-        let reproduced = !noise_check.has_failed();
         notes.extend(remarks(&stack, &split, &found));
         let next = next::propose(&self.bench(config), &found);
         notes.extend(next.notes);
@@ -293,14 +293,15 @@ impl<'a> Base<'a> {
         let (over_session, does_not_repeat) =
             self.over_session(&stack, &all, &found, &rest, config);
         notes.extend(over_session::notes(&over_session, &does_not_repeat));
-        let remainder = over_session::remainder(&mut found, &shrunk, config);
+        let remainder = over_session::remainder(&mut found, &shrunk, before.flagged(), config);
         let is_left = remainder.is_some();
         notes.extend(remainder);
-        let gap = gap::table(&all, &sizes, before.flagged());
-        // What is much larger than noise is no noise, also where the floor is not that of the repeats; nothing is named then.
-        let is_large = gap.rms_um >= LEAST_UNKNOWN * gap.floor_um;
-        let flagged = (reproduced || is_large) && before.flagged() && (beside.flagged() || is_left);
-        let effects = [found.entries(), scattered.entries()].concat();
+        // What came after the runs that are fitted is a gap that these do not show.
+        let is_late = is_left && !before.flagged();
+        let gap = gap::table(&all, &sizes, before.flagged() || is_late);
+        let stands_out = stands_out(&gap, !noise_check.has_failed());
+        let flagged = stands_out && before.flagged() && (beside.flagged() || is_left);
+        let effects = [found.entries(), scattered.entries()];
         let of = ([&stack, &all], [&before, &beside]);
         let figures = figures(of, &slots, &found, &shrunk, config);
         let report = GapReport {
@@ -309,7 +310,7 @@ impl<'a> Base<'a> {
             gap,
             r#where: places::places(&stack, &slots, &before.families, &floated),
             causes: [found.causes(), scattered.causes].concat(),
-            unknown: unknown::unknown(&stack, &slots, &beside, flagged, &rest),
+            unknown: unknown::unknown(&stack, &slots, &beside, (flagged, is_late), &rest),
             shrink: shrunk.shrink,
             not_excited: not_excited(&found, &scattered.seen, kinds),
             next_experiments: next.entries,
@@ -322,7 +323,7 @@ impl<'a> Base<'a> {
             report,
             figures,
             notes: follows::with_sign(notes, &stack, &found),
-            effects,
+            effects: effects.concat(),
             experiments: next.experiments,
         }
     }
@@ -487,7 +488,7 @@ pub(crate) fn considered(config: &GapConfig) -> Result<Vec<&'static Kind>, GapEr
     {
         return Err(GapError::LeftOut { id: id.clone() });
     }
-    // Only a log asks for what goes with a thermometer (`by_thermometer`).
+    // Logs ask for what goes with a thermometer (`by_thermometer`), and drifts that a temperature explains better (`by_clock`).
     let kept = |kind: &&&'static Kind| {
         kind.id != by_thermometer::SHIFT && config.left_out.iter().all(|id| id != kind.id)
     };
@@ -550,6 +551,12 @@ fn notes(rows: &Rows, noise: &BTreeMap<Channel, Noise>) -> Vec<Note> {
         }
     }
     notes
+}
+
+/// Whether a gap may be unknown: what is much larger than noise is no noise, also where the floor is not that of the repeats;
+/// nothing is named then.
+fn stands_out(gap: &Gap, reproduced: bool) -> bool {
+    reproduced || gap.rms_um >= LEAST_UNKNOWN * gap.floor_um
 }
 
 /// Kinds of which no instance could be seen.

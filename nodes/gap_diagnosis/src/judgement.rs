@@ -5,6 +5,7 @@
 
 pub(crate) mod along;
 pub(crate) mod aside;
+pub(crate) mod at_instant;
 pub(crate) mod by_clock;
 pub(crate) mod by_thermometer;
 pub(crate) mod cause;

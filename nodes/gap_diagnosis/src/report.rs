@@ -112,6 +112,9 @@ pub struct OverSession {
 pub struct DoesNotRepeat {
     /// The channel that changed most.
     pub channel: String,
+    /// What was touched there; absent of other channels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub feature: Option<String>,
     /// By how much, µm.
     pub size_um: f64,
     /// The last run before, of those that show it.

@@ -35,6 +35,7 @@ use crate::error::GapError;
 use crate::following::GapDiagnosisConfig;
 use crate::noise::repeats::same_condition;
 use crate::report::{Cause, GapReport, Status};
+use crate::search::signature::INSTANT;
 use crate::session::{self, SessionBuilder, SessionConfig, SessionError};
 
 mod told;
@@ -110,8 +111,6 @@ impl Task {
 /// D from which an effect is found in every diagnosis. One nearer to what can be seen at all (about 8) is named in one and
 /// not in the next: that is no change of the machine.
 const MIN_D_OF_CHANGE: f64 = 10.0;
-/// Parameter of an effect that sets in at an instant.
-const INSTANT: &str = "at_min";
 /// Where so many ticks follow one another without a word from the controller, what has ended is whole. They are counted
 /// and not timed, for samples may wait in a process that was stopped for a while.
 const SILENT_TICKS: u32 = 3;

@@ -8,7 +8,8 @@
 //!   gain(drift) - max gain(shift) >= 0,   |shift| <= 50 um/K               (1)
 //! ```
 //!
-//! Where (1) does not hold the drift is shown with that reason: it is not named, and what warms is not known either.
+//! Where (1) does not hold the drift is shown with that reason and not named. In other recordings than logs the shifts with the
+//! thermometers that do best in its place are then searched as well.
 //!
 //! Where no thermometer was read (for a growth: none at the spindle), a growth or a coolant's step is known by its course in time alone,
 //! and the drift is listed with it.
@@ -18,15 +19,16 @@ use std::collections::BTreeSet;
 use metrology::Axis;
 use nalgebra::DVector;
 use twin::Channel;
-use twin::effects::{self, Target};
+use twin::effects::{self, Kind, Target};
 
 use crate::judgement::by_thermometer::{self, SHIFT};
-use crate::judgement::cause::{Best, Member, Scope};
-use crate::judgement::{Check, CheckId, unresolved};
+use crate::judgement::cause::{Best, Found, Member, Scope};
+use crate::judgement::{Check, CheckId, Verdict, unresolved};
 use crate::noise::stack::Stack;
 use crate::report::Status;
 use crate::search::nuisance::orthonormal;
-use crate::search::signature::Library;
+use crate::search::signature::{Instance, Library};
+use crate::session::log;
 
 /// The effect that has no other cause than time.
 pub(crate) const BY_CLOCK: &str = "ambient_drift";
@@ -37,6 +39,8 @@ const GROWTH: &str = "spindle_growth";
 const LAGS_MIN: [f64; 5] = [0.05, 8.0, 25.0, 80.0, 240.0];
 /// The largest shift of a tip that a machine has, µm/K.
 const MOST_UM_PER_K: f64 = 50.0;
+/// Share of the best gain from which a thermometer is tried beside the best.
+const NEAR_THE_BEST: f64 = 0.8;
 
 /// (1) of the member at `place`; `others` are the derivatives of the other members. None where nothing is asked.
 pub(crate) fn check(
@@ -61,20 +65,81 @@ pub(crate) fn check(
     let beside = |column: &DVector<f64>| column - &basis * basis.tr_mul(column);
     let rest = beside(&(&best.left + part));
     let own = rest.norm_squared() - beside(&best.left).norm_squared();
-    let shifts = read.keys().flat_map(|id| {
-        LAGS_MIN.map(|lag_min| {
-            let mut values = vec![0.0; kind.parameters.len()];
-            values[axis.index()] = 1.0;
-            if let Some(lag) = values.last_mut() {
-                *lag = lag_min;
-            }
-            (kind.build)(Target::Thermometer(id.clone()), &values)
-        })
-    });
-    let gains = shifts.filter_map(|effect| gain(&rest, &beside(&stack.signature(&*effect))));
-    let best_gain = gains.fold(0.0, f64::max);
-    let lost = own - best_gain;
+    let gains = read
+        .keys()
+        .map(|id| best_gain(stack, (kind, id, axis), &rest, beside));
+    let lost = own - gains.fold(0.0, f64::max);
     Some(Check::new(CheckId::BeatsHeat, lost >= 0.0).with(lost, 0.0))
+}
+
+/// What the shift with one thermometer explains of a rest, with the lag that does best.
+fn best_gain(
+    stack: &Stack<'_>,
+    (kind, id, axis): (&Kind, &str, Axis),
+    rest: &DVector<f64>,
+    beside: impl Fn(&DVector<f64>) -> DVector<f64>,
+) -> f64 {
+    let shifts = LAGS_MIN.map(|lag_min| {
+        let mut values = vec![0.0; kind.parameters.len()];
+        values[axis.index()] = 1.0;
+        if let Some(lag) = values.last_mut() {
+            *lag = lag_min;
+        }
+        (kind.build)(Target::Thermometer(id.to_owned()), &values)
+    });
+    let gains = shifts.iter();
+    let gains = gains.filter_map(|effect| gain(rest, &beside(&stack.signature(&**effect))));
+    gains.fold(0.0, f64::max)
+}
+
+/// Shifts with the thermometers that do best in the place of the slow drifts which fail (1), for recordings that are no logs.
+pub(crate) fn shifts(scope: &Scope<'_, '_>, found: &Found) -> Vec<Instance> {
+    let stack = scope.stack;
+    let is_left_out = scope.config.left_out.iter().any(|id| id == SHIFT);
+    let is_asked = !is_left_out && !log::is_of_logs(stack);
+    let Some(kind) = effects::kind(SHIFT).filter(|_| is_asked) else {
+        return vec![];
+    };
+    let fails =
+        |check: &Check| check.check == CheckId::BeatsHeat && check.verdict == Verdict::Failed;
+    let mut ids = BTreeSet::<&String>::new();
+    for member in &found.members {
+        let own = found.instance(member);
+        let (true, Target::Axis(axis)) = (member.checks.iter().any(fails), &own.target) else {
+            continue;
+        };
+        let part = stack.signature(&*own.effect(&member.estimate.values));
+        let rest = &found.left + part;
+        let read = stack.session.history.temperature_degc.keys();
+        let gains = read.map(|id| {
+            let gain = best_gain(stack, (kind, id, *axis), &rest, DVector::clone);
+            (gain, id)
+        });
+        let gains: Vec<(f64, &String)> = gains.collect();
+        let most = gains.iter().map(|own| own.0).fold(0.0, f64::max);
+        let near = gains.iter().filter(|own| own.0 >= NEAR_THE_BEST * most);
+        ids.extend(near.map(|own| own.1));
+    }
+    ids.into_iter()
+        .map(|id| Instance {
+            kind,
+            target: Target::Thermometer(id.clone()),
+            begins: None,
+        })
+        .collect()
+}
+
+/// Adds the forms of shifts with a temperature along one direction: a body that grows along it needs no other.
+pub(crate) fn add_along_one(signatures: &mut Library) {
+    for form in 0..signatures.forms.len() {
+        let own = &signatures.forms[form];
+        let sizes = own.amplitudes.len();
+        if signatures.instances[own.instance].kind.id == SHIFT && sizes > 1 {
+            for size in 0..sizes {
+                signatures.add_part(form, &[size]);
+            }
+        }
+    }
 }
 
 /// Lists the slow drift with what warms the machine, where none of its thermometers was read and one axis.

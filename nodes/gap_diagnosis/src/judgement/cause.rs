@@ -14,6 +14,7 @@ use twin::effects::{Kind, Moment, Parameter, Role};
 
 use crate::config::GapConfig;
 use crate::judgement::aside;
+use crate::judgement::at_instant;
 use crate::judgement::by_clock;
 use crate::judgement::by_thermometer;
 use crate::judgement::form_doubt;
@@ -151,6 +152,7 @@ fn list_look_alikes(
     in_course::list(stack, signatures, members, scope.config);
     other_thermometer::list(stack, signatures, members, thermometers);
     with_heat::list(stack, signatures, members);
+    at_instant::list(stack, signatures, members);
 }
 
 /// Searches the catalogue.
@@ -163,6 +165,15 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     instances.retain(|own| !by_thermometer::is_of_another(stack, own, &thermometers));
     instances.extend(by_thermometer::shifts(scope, &thermometers));
     let found = found_among(scope, instances.clone(), &thermometers);
+    let warmer = by_clock::shifts(scope, &found);
+    if !warmer.is_empty() {
+        let more = [instances.clone(), warmer].concat();
+        let warmed = found_among(scope, more, &thermometers);
+        let is_shift = |member: &Member| warmed.instance(member).kind.id == by_thermometer::SHIFT;
+        if warmed.named().any(is_shift) {
+            return warmed;
+        }
+    }
     let hiding = by_thermometer::hiding(stack, &found);
     if hiding.is_empty() {
         return found;
@@ -178,6 +189,7 @@ fn found_among(scope: &Scope<'_, '_>, instances: Vec<Instance>, thermometers: &[
     let stack = scope.stack;
     let mut signatures = Library::new(stack, instances);
     lines::add(stack, scope.slots, &mut signatures);
+    by_clock::add_along_one(&mut signatures);
     widening::widen_curves(stack, &mut signatures);
     let mut normal = signatures.normal(&stack.z);
     [signatures.aside, signatures.shared] = aside::set_aside(stack, &signatures, &normal);

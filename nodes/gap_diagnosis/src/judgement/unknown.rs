@@ -113,12 +113,12 @@ fn left_grams(slots: &[Slot], fitted: &[DVector<f64>]) -> Vec<DMatrix<f64>> {
     slots.iter().map(of).collect()
 }
 
-/// The report's part on what the named effects leave (`rest`, mm).
+/// The report's part on what the named effects leave (`rest`, mm): whether it is flagged, or the held-out runs alone are.
 pub fn unknown(
     stack: &Stack<'_>,
     slots: &[Slot],
     leftover: &Leftover,
-    flagged: bool,
+    (flagged, is_late): (bool, bool),
     rest: &[f64],
 ) -> Unknown {
     let left = &stack.whitened(rest.to_vec());
@@ -128,7 +128,7 @@ pub fn unknown(
         _ => Description::default(),
     };
     Unknown {
-        flagged,
+        flagged: flagged || is_late,
         score: leftover.score,
         threshold: leftover.threshold,
         description,

@@ -33,7 +33,7 @@ use crate::search::nuisance::orthonormal;
 use crate::search::refit::{self, Estimate};
 use crate::search::rows::{Block, count};
 use crate::search::selection::{MOST_CANCELLING, Set};
-use crate::search::signature::{Instance, Library, OWN_TIME};
+use crate::search::signature::{INSTANT, Instance, Library, OWN_TIME};
 
 /// What speaks against naming an effect that was found.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -515,10 +515,8 @@ fn bend(stack: &Stack<'_>, instance: &Instance, estimate: &Estimate) -> Option<(
     Some((bend.norm(), SAME_SIGNATURE.max(LEAST_BEND * whole.norm())))
 }
 
-/// Parameter that tells when an effect begins, min.
-const BEGINS: &str = "at_min";
 /// Whitened distance below which two signatures are the same.
-const SAME_SIGNATURE: f64 = 3.0;
+pub(crate) const SAME_SIGNATURE: f64 = 3.0;
 
 /// Whitened distance of a step in time from the same at the very beginning: where it is small, what is there does not change.
 /// None for what is no step.
@@ -526,7 +524,7 @@ fn since_begin(stack: &Stack<'_>, instance: &Instance, estimate: &Estimate) -> O
     let own = instance.kind.parameters;
     let shapes = || own.iter().filter(|p| p.role != Role::Amplitude);
     let is_step = shapes().count() == 1 && estimate.active.iter().all(|place| *place < own.len());
-    let begins = own.iter().position(|parameter| parameter.name == BEGINS);
+    let begins = own.iter().position(|parameter| parameter.name == INSTANT);
     let begins = begins.filter(|_| is_step)?;
     let mut values = estimate.values.clone();
     values[begins] = own[begins].low;

@@ -11,7 +11,8 @@
 //!
 //! With five repeats and more the weights are also orthogonal to time, with nine to its square, with
 //! thirteen to its cube: what drifts through the session is the machine's, not noise; nor is what changed in steps (`changes`),
-//! to which they are orthogonal as well. Touches of one
+//! to which they are orthogonal as well. Touches are minutes apart, with a machine that warms between them: of five and more
+//! half of all powers are left out, so that only what differs from one cycle to the next is noise. Touches of one
 //! feature from one side, at one feed and in one pose of the rotary axes are repeats within a run as well.
 //!
 //! Rows of tests in motion are one where they are of one station of the path; those of a log where they are of one time
@@ -33,7 +34,12 @@ use crate::session::log;
 
 mod touches;
 
-pub use touches::{Label, label};
+/// Repeats of touches up to which no power of time is left out.
+const MOST_WITHOUT_POWERS: usize = 4;
+/// Most powers of time that are left out of differences of touches.
+const MOST_POWERS_OF_TOUCHES: usize = 7;
+
+pub use touches::{Label, is_same_touch, label};
 
 /// Differences of one group of repeats.
 #[derive(Clone, Debug)]
@@ -78,6 +84,12 @@ pub fn contrasts(
         all.entry(channel).or_default().extend(found);
     }
     all
+}
+
+/// By block of a group of touches: by row of the first, the row that repeats it.
+pub(crate) fn matched(session: &Session, blocks: &[&Block]) -> Vec<Vec<Option<usize>>> {
+    let matched = |block: &&Block| touches::matched(session, blocks[0], block);
+    blocks.iter().map(matched).collect()
 }
 
 /// Poses of a rotary axis that differ by less are one.
@@ -198,7 +210,8 @@ fn runs_between(
         .map(|block| time_s(&session.runs[block.run], &block.rows[0]))
         .collect();
     let runs: Vec<usize> = blocks.iter().map(|block| block.run).collect();
-    let values: Vec<Vec<f64>> = weights_beside(&times, &runs, steps)
+    let powers = powers(&blocks[0].channel, times.len());
+    let values: Vec<Vec<f64>> = weights_beside(&times, &runs, steps, powers)
         .iter()
         .map(|weight| {
             (0..places[0].len())
@@ -209,10 +222,18 @@ fn runs_between(
                 .collect()
         })
         .collect();
+    let joins = Joins::new(session, blocks, &places, residual, steps);
+    let (rows, values) = match blocks[0].channel {
+        Channel::Touch => {
+            let first = &session.runs[blocks[0].run];
+            touches::of_noise(first, blocks[0], &places[0], values)
+        }
+        _ => (places[0].clone(), values),
+    };
     (!values.is_empty()).then(|| Contrasts {
         blocks: group.to_vec(),
-        rows: places[0].clone(),
-        joins: Joins::new(session, blocks, &places, residual, steps),
+        rows,
+        joins,
         values,
         one_zero: have_one_zero(session, blocks),
     })
@@ -280,17 +301,35 @@ fn log_between(
 
 /// Weights of (1) for repeats at some times.
 fn weights(times: &[f64]) -> Vec<DVector<f64>> {
-    weights_beside(times, &[], &[])
+    weights_beside(times, &[], &[], powers_of_motion(times.len()))
 }
 
-/// The same, orthogonal to steps as well.
-fn weights_beside(times: &[f64], runs: &[usize], steps: &[usize]) -> Vec<DVector<f64>> {
+/// Powers of time to which differences of so many repeats are orthogonal.
+fn powers(channel: &Channel, repeats: usize) -> usize {
+    match channel {
+        Channel::Touch if repeats > MOST_WITHOUT_POWERS => {
+            (repeats.saturating_sub(1) / 2).min(MOST_POWERS_OF_TOUCHES)
+        }
+        _ => powers_of_motion(repeats),
+    }
+}
+
+fn powers_of_motion(repeats: usize) -> usize {
+    (repeats.saturating_sub(1) / 4).min(3)
+}
+
+/// The same, orthogonal to steps as well, and to so many powers of time.
+fn weights_beside(
+    times: &[f64],
+    runs: &[usize],
+    steps: &[usize],
+    powers: usize,
+) -> Vec<DVector<f64>> {
     let n = times.len();
     let (first, last) = (times[0], times[n - 1]);
     let scaled = |t: f64| (t - first) / (last - first).max(f64::MIN_POSITIVE) * 2.0 - 1.0;
-    let powers = ((n - 1) / 4).min(3);
     let smooth = (0..=powers).map(|power| {
-        let power = i32::try_from(power).expect("at most three");
+        let power = i32::try_from(power).expect("at most seven");
         DVector::from_iterator(n, times.iter().map(|t| scaled(*t).powi(power)))
     });
     let unit = (0..n).map(|i| DVector::from_fn(n, |row, _| if row == i { 1.0 } else { 0.0 }));

@@ -22,7 +22,6 @@ use crate::noise::form_error::FormError;
 use crate::noise::whitener::Whitener;
 use crate::search::nuisance::Nuisance;
 use crate::search::rows::{Block, Rows, count, variances_within};
-use crate::session::thermal_floats::ThermalFloat;
 
 /// What the twin predicted for the rows of some runs, by effect and the bits of its values.
 pub type Simulated = Rc<RefCell<BTreeMap<(String, Vec<u64>), Rc<[f64]>>>>;
@@ -49,6 +48,8 @@ pub struct Stack<'a> {
     unweighted: Nuisance,
     /// Columns that float beside what set-ups leave open.
     floats: Vec<Vec<f64>>,
+    /// Instants at which the session changed, seconds since its start.
+    pub events_s: Rc<[f64]>,
     /// Predictions that stacks of the same runs share; none are kept where they are not shared.
     simulated: Option<Simulated>,
 }
@@ -94,6 +95,7 @@ impl<'a> Stack<'a> {
             nuisance,
             unweighted,
             floats: vec![],
+            events_s: Rc::from([]),
             simulated: None,
         };
         stack.z = stack.whitened(raw.clone());
@@ -101,12 +103,12 @@ impl<'a> Stack<'a> {
         stack
     }
 
-    /// The same stack beside what floats in its logs.
-    pub(crate) fn floating(mut self, floats: &[ThermalFloat]) -> Self {
+    /// The same stack beside columns that float as well.
+    pub(crate) fn floating(mut self, floats: Vec<Vec<f64>>) -> Self {
         if floats.is_empty() {
             return self;
         }
-        self.floats = floats.iter().map(|float| float.column(&self)).collect();
+        self.floats = floats;
         let (twin, session) = (self.twin, self.session);
         let whiten = |column: &mut [f64]| self.whitener.apply(column);
         self.nuisance = Nuisance::new(twin, session, &self.rows, &self.floats, whiten);
@@ -134,6 +136,7 @@ impl<'a> Stack<'a> {
             nuisance,
             unweighted: self.unweighted.clone(),
             floats: self.floats.clone(),
+            events_s: Rc::clone(&self.events_s),
             simulated: self.simulated.clone(),
             ..*self
         };

@@ -20,7 +20,8 @@ use crate::search::families::{self, Slot};
 use crate::search::resolved;
 use crate::search::signature::Begins;
 use crate::search::widening;
-use crate::session::changes::Change;
+use crate::session::changes::moved::Moved;
+use crate::session::changes::{self, Change};
 use crate::session::thermal_floats::{self, ThermalFloat};
 use crate::shrink::split::{self, Split};
 
@@ -44,6 +45,8 @@ pub(crate) struct Base<'a> {
     pub(crate) is_of_targets: bool,
     /// What is taken out of logs.
     pub(crate) floats: Vec<ThermalFloat>,
+    /// What was touched and moved for itself.
+    pub(crate) moved: Vec<Moved>,
 }
 
 impl<'a> Base<'a> {
@@ -64,7 +67,7 @@ impl<'a> Base<'a> {
         noise: &BTreeMap<Channel, Noise>,
         form: &FormError,
     ) -> Stack<'a> {
-        let stack = Stack::new(
+        let mut stack = Stack::new(
             self.session,
             self.twin,
             runs,
@@ -73,7 +76,11 @@ impl<'a> Base<'a> {
             &form.at_targets(self.is_of_targets),
             self.residual,
         );
-        stack.floating(&self.floats)
+        stack.events_s = changes::events_s(self.session, &self.changes).into();
+        let of_logs = self.floats.iter().map(|float| float.column(&stack));
+        let of_touches = self.moved.iter().map(|moved| moved.column(&stack));
+        let floats = of_logs.chain(of_touches).collect();
+        stack.floating(floats)
     }
 
     /// Searches some runs twice: once with the form error that every simulator has, then with what the effects

@@ -45,7 +45,12 @@ pub struct Begins {
     pub run: u32,
     /// When it begins, seconds since the session's start.
     pub at_s: f64,
+    /// Whether touches alone show that something begins there.
+    pub is_touched_alone: bool,
 }
+
+/// Kinds that wear makes, which begin where touches alone show a change. Of all else that might begin there, much reads alike.
+const OF_WEAR: [&str; 2] = ["backlash", "feed_lost_motion"];
 
 /// An effect that acts from a run on.
 struct From {
@@ -107,8 +112,11 @@ impl Instance {
 
     /// The same instances, then each that may begin at some time as it begins there.
     pub fn with_begins(all: Vec<Self>, begins: &[Begins]) -> Vec<Self> {
-        let may = |own: &&Self| !OWN_TIME.contains(&own.kind.id);
         let from = |at: &Begins| -> Vec<Self> {
+            let may = |own: &&Self| {
+                let id = &own.kind.id;
+                !OWN_TIME.contains(id) && (!at.is_touched_alone || OF_WEAR.contains(id))
+            };
             let later = |own: &Self| Self {
                 begins: Some(*at),
                 ..own.clone()
@@ -202,7 +210,11 @@ impl Library {
             shared: BTreeMap::new(),
         };
         for instance in 0..signatures.instances.len() {
-            for values in shapes(signatures.instances[instance].kind) {
+            let kind = signatures.instances[instance].kind;
+            for values in shapes(kind)
+                .into_iter()
+                .chain(at_events(kind, &stack.events_s))
+            {
                 signatures.add(stack, instance, values, false);
             }
         }
@@ -314,6 +326,27 @@ impl Library {
         }
         Normal::new(&DMatrix::from_columns(&self.columns), z)
     }
+}
+
+/// Parameter that is the instant of an event, min since the session began.
+pub const INSTANT: &str = "at_min";
+
+/// The same points with the instant at each of some events; none for a kind without an instant.
+fn at_events(kind: &Kind, events_s: &[f64]) -> Vec<Vec<f64>> {
+    let instant = kind.parameters.iter().position(|own| own.name == INSTANT);
+    let Some(instant) = instant else {
+        return vec![];
+    };
+    let mut all = vec![];
+    for at_s in events_s {
+        for mut values in shapes(kind) {
+            values[instant] = at_s / 60.0;
+            if !all.contains(&values) {
+                all.push(values);
+            }
+        }
+    }
+    all
 }
 
 /// Values of every point of the shape grids, amplitudes zero.

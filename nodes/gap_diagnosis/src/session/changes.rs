@@ -21,7 +21,7 @@
 //!
 //! # Holds when
 //! Repeats of one test between steps differ by independent draws. A step that only one run shows is an outlier, and not found:
-//! without any one of the runs it is still there. Logs and touches are not looked at.
+//! without any one of the runs it is still there. Logs are not looked at; touches as `touched` has it.
 //!
 //! A set-up that moved once, and a reference point that shifted once, are one and the same in what instruments on the table
 //! read: both are an offset from a run on. Effects may have it, and it is reported besides. What moved more often no single
@@ -31,20 +31,16 @@
 //! \[1\] E. S. Page, Biometrika 42, 1955 (change at an unknown point). \[2\] J. Bai, P. Perron, Econometrica 66, 1998 (several).
 
 pub mod evenly;
+pub(crate) mod moved;
+mod series;
+mod touched;
 
-use std::collections::BTreeMap;
-
-use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
-use twin::{Channel, Session};
+use twin::{Channel, Session, Touch};
 
 use crate::config::GapConfig;
-use crate::noise::repeats;
-use crate::search::field::{self, Mode};
-use crate::search::nuisance::orthonormal;
-use crate::search::rows::{Rows, count, time_s};
+use crate::search::rows::{Rows, count};
 use crate::search::signature::{Begins, begin_s};
-use crate::session::log;
+use series::{Series, series};
 
 /// Chance in noise above which a step is not taken for one.
 const MOST_CHANCE: f64 = 0.01;
@@ -52,8 +48,6 @@ const MOST_CHANCE: f64 = 0.01;
 const MOST_STEPS: usize = 4;
 /// Boundaries above which pairs are not gone through.
 const MOST_IN_PAIRS: usize = 48;
-/// Highest harmonic of the patterns.
-const MOST_HARMONICS: usize = 4;
 /// Steps must be this many times what repeats between them differ by, and what every simulator is off by.
 const LEAST_DEVIATIONS: f64 = 4.0;
 const LEAST_FORM_ERRORS: f64 = 2.0;
@@ -67,30 +61,18 @@ pub struct Change {
     pub between: [usize; 2],
     /// Where it is largest.
     pub channel: Channel,
+    /// What is touched there.
+    pub feature: Option<String>,
     /// Its largest coefficient, mm.
     pub size_mm: f64,
     /// Chance in noise.
     pub chance: f64,
-    /// Whether an offset, or the centre of a ballbar, and nothing else changed: the set-up moved.
+    /// Whether an offset, or the centre of a ballbar, or one thing that is touched, and nothing else changed: it moved.
     pub is_set_up: bool,
-}
-
-/// Coefficient of one pattern in one block.
-#[derive(Clone, Copy, Debug)]
-struct Point {
-    group: usize,
-    run: usize,
-    time_s: f64,
-    value_mm: f64,
-}
-
-/// One pattern of one channel over the session.
-#[derive(Clone, Debug)]
-struct Series {
-    channel: Channel,
-    points: Vec<Point>,
-    /// Whether it is the place of a set-up.
-    is_shared: bool,
+    /// Whether touches alone show it.
+    pub is_touched_alone: bool,
+    /// The touches that show it.
+    pub touches: Vec<Touch>,
 }
 
 /// The steps of a session, in their order; `raw` is the residual of each row, mm.
@@ -122,7 +104,11 @@ pub fn left(
     let all = series(session, rows, rest, set_ups);
     let steps: Vec<usize> = changes.iter().map(|change| change.between[1]).collect();
     let size = |at: usize, change: &Change| {
-        let own = all.iter().filter(|own| own.channel == change.channel);
+        let shows = |own: &&Series| match &own.touch {
+            Some(touch) if !change.touches.is_empty() => change.touches.contains(touch),
+            _ => own.channel == change.channel,
+        };
+        let own = all.iter().filter(shows);
         own.map(|own| own.size_mm(&steps, at)).fold(0.0, f64::max)
     };
     changes
@@ -140,7 +126,7 @@ pub(crate) const MOVES_ONCE: &str = "homing_shift";
 pub fn set_up_anew(session: &Session, changes: &[Change], config: &GapConfig) -> Option<Session> {
     let moved: Vec<usize> = changes
         .iter()
-        .filter(|change| change.is_set_up)
+        .filter(|change| change.is_set_up && !change.is_touched_alone)
         .map(|change| change.between[1])
         .collect();
     let is_offered = config.left_out.iter().all(|id| id != MOVES_ONCE);
@@ -158,194 +144,37 @@ pub fn set_up_anew(session: &Session, changes: &[Change], config: &GapConfig) ->
     Some(anew)
 }
 
+/// Time after the end of a run at which something is taken to happen that is there in the next one, s.
+const AFTER_S: f64 = 1.0;
+
+/// Instants at which the session changed, seconds since its start: as early as may be, so that what comes with a lag has come.
+pub fn events_s(session: &Session, changes: &[Change]) -> Vec<f64> {
+    let end_s = |change: &Change| {
+        let run = &session.runs[change.between[0]];
+        let moves = run.motion.time_s.last().copied();
+        let touched = run.touches.last().map(|touch| touch.time_s);
+        Some(moves.into_iter().chain(touched).reduce(f64::max)? + AFTER_S)
+    };
+    changes.iter().filter_map(end_s).collect()
+}
+
 /// Most changes from which on effects are tried.
 const MOST_BEGINS: usize = 2;
 
-/// First runs after the largest changes that no moved set-up explains.
+/// First runs after the largest changes that no set-up explains.
 pub fn begins(session: &Session, changes: &[Change]) -> Vec<Begins> {
-    let mut own: Vec<&Change> = changes.iter().filter(|change| !change.is_set_up).collect();
+    let is_own = |change: &&Change| !change.is_set_up;
+    let mut own: Vec<&Change> = changes.iter().filter(is_own).collect();
     own.sort_by(|a, b| b.size_mm.total_cmp(&a.size_mm));
     let begin = |change: &&Change| {
         let run = &session.runs[change.between[1]];
         Some(Begins {
             run: run.segment.run,
             at_s: begin_s(run)?,
+            is_touched_alone: change.is_touched_alone,
         })
     };
     own.iter().take(MOST_BEGINS).filter_map(begin).collect()
-}
-
-/// Coefficients of all patterns of repeated blocks.
-fn series(session: &Session, rows: &Rows, raw: &[f64], set_ups: &[[u32; 2]]) -> Vec<Series> {
-    let mut all = BTreeMap::<(Channel, usize, [u32; 2]), Series>::new();
-    let groups = repeats::groups(session, rows);
-    let repeated = groups.iter().enumerate().filter(|(_, own)| own.len() > 1);
-    for (group, own) in repeated {
-        for block in own.iter().map(|place| &rows.blocks[*place]) {
-            let run = &session.runs[block.run];
-            let is_still = matches!(block.channel, Channel::Touch | Channel::Thermometer(_));
-            if is_still || log::is_log(run) {
-                continue;
-            }
-            let (kinds, modes) = field::modes(run, block);
-            let wanted: Vec<usize> = (0..kinds.len())
-                .filter(|k| !matches!(kinds[*k], Mode::Place(n) if n > MOST_HARMONICS))
-                .collect();
-            let modes = modes.select_columns(&wanted);
-            let values = DVector::from_column_slice(&raw[block.range()]);
-            let Some(sizes) = solved(&modes, &values) else {
-                continue;
-            };
-            for (pattern, kind) in wanted.iter().map(|k| kinds[*k]).enumerate() {
-                let radial = block.channel == Channel::Radial && kind == Mode::Place(1);
-                let is_shared = kind == Mode::Offset || radial;
-                // A place under another zero, or set up anew, is another place.
-                let own = set_ups.get(block.run).filter(|_| is_shared);
-                let set_up = own.copied().unwrap_or_default();
-                let key = (block.channel.clone(), pattern, set_up);
-                let own = all.entry(key).or_insert_with(|| Series {
-                    channel: block.channel.clone(),
-                    points: vec![],
-                    is_shared,
-                });
-                own.points.push(Point {
-                    group,
-                    run: block.run,
-                    time_s: time_s(run, &block.rows[0]),
-                    value_mm: sizes[pattern],
-                });
-            }
-        }
-    }
-    all.into_values()
-        .filter(|own| own.points.len() > 3)
-        .collect()
-}
-
-/// Least squares; `None` where the rows do not separate the columns.
-fn solved(columns: &DMatrix<f64>, values: &DVector<f64>) -> Option<DVector<f64>> {
-    if columns.nrows() < 2 * columns.ncols() || values.iter().any(|v| !v.is_finite()) {
-        return None;
-    }
-    let gram = columns.tr_mul(columns).cholesky()?;
-    Some(gram.solve(&columns.tr_mul(values)))
-}
-
-impl Series {
-    fn groups(&self) -> Vec<usize> {
-        let mut groups: Vec<usize> = self.points.iter().map(|point| point.group).collect();
-        groups.sort_unstable();
-        groups.dedup();
-        groups
-    }
-
-    fn column(&self, of: impl Fn(&Point) -> f64) -> DVector<f64> {
-        DVector::from_iterator(self.points.len(), self.points.iter().map(of))
-    }
-
-    /// One column a group, or one for all where the set-up has one place.
-    fn by_group(&self, of: &dyn Fn(&Point) -> f64) -> Vec<DVector<f64>> {
-        if self.is_shared {
-            return vec![self.column(of)];
-        }
-        let of_group =
-            |group: usize| self.column(|point| if point.group == group { of(point) } else { 0.0 });
-        self.groups().into_iter().map(of_group).collect()
-    }
-
-    fn means(&self) -> Vec<DVector<f64>> {
-        let own = |group: usize| self.column(|p| f64::from(u8::from(p.group == group)));
-        self.groups().into_iter().map(own).collect()
-    }
-
-    fn stepped(&self, steps: &[usize]) -> Vec<DVector<f64>> {
-        let of_step = |step: &usize| {
-            let step = *step;
-            self.by_group(&move |p: &Point| f64::from(u8::from(p.run >= step)))
-        };
-        steps.iter().flat_map(of_step).collect()
-    }
-
-    /// What some columns beside the means leave, as a sum of squares, and the freedom of that.
-    fn left(&self, columns: Vec<DVector<f64>>) -> (f64, usize) {
-        let n = self.points.len();
-        let values = self.column(|point| point.value_mm);
-        let basis = orthonormal(n, self.means().into_iter().chain(columns));
-        let left = &values - &basis * basis.tr_mul(&values);
-        (left.norm_squared(), n.saturating_sub(basis.ncols()))
-    }
-
-    /// What as many powers of time leave.
-    fn left_by_time(&self, most: usize) -> f64 {
-        let times = || self.points.iter().map(|point| point.time_s);
-        let first = times().fold(f64::INFINITY, f64::min);
-        let last = times().fold(f64::NEG_INFINITY, f64::max);
-        let scaled = |t: f64| (t - first) / (last - first).max(f64::MIN_POSITIVE) * 2.0 - 1.0;
-        let powers = (1..=most).flat_map(|power| {
-            let power = i32::try_from(power).unwrap_or(1);
-            self.by_group(&move |p: &Point| scaled(p.time_s).powi(power))
-        });
-        self.left(powers.collect()).0
-    }
-
-    /// Chance (2) of some steps beside others, before it is multiplied.
-    fn chance(&self, beside: &[usize], with: &[usize]) -> f64 {
-        let (before, free) = self.left(self.stepped(beside));
-        let (after, left) = self.left(self.stepped(with));
-        let used = free.saturating_sub(left);
-        if used == 0 || left < 2 || before <= 0.0 {
-            return 1.0;
-        }
-        let ratio = (before - after) / count(used) / (after / count(left)).max(before * 1e-15);
-        FisherSnedecor::new(count(used), count(left)).map_or(1.0, |law| law.sf(ratio.max(0.0)))
-    }
-
-    /// Whether no run alone makes a step beside the others.
-    fn is_of_several_runs(&self, beside: &[usize], with: &[usize]) -> bool {
-        let is_there_without = |run: usize| {
-            let points = self.points.iter().filter(|point| point.run != run);
-            let rest = Self {
-                channel: self.channel.clone(),
-                points: points.copied().collect(),
-                is_shared: self.is_shared,
-            };
-            rest.chance(beside, with) < MOST_CHANCE
-        };
-        self.points.iter().all(|point| is_there_without(point.run))
-    }
-
-    /// Log-likelihood that steps gain.
-    fn gain(&self, steps: &[usize]) -> f64 {
-        let (before, free) = self.left(vec![]);
-        let (after, left) = self.left(self.stepped(steps));
-        if left < 2 || before <= 0.0 {
-            return 0.0;
-        }
-        let per_freedom = (after / count(left)) / (before / count(free));
-        0.5 * count(left) * -per_freedom.max(1e-12).ln()
-    }
-
-    /// Coefficient of one step beside the others, the largest of the groups, mm.
-    fn size_mm(&self, steps: &[usize], at: usize) -> f64 {
-        let means = self.means();
-        let columns: Vec<DVector<f64>> = means.iter().cloned().chain(self.stepped(steps)).collect();
-        let own = self.stepped(&steps[..1]).len();
-        let first = means.len() + at * own;
-        let svd = DMatrix::from_columns(&columns).svd(true, true);
-        let Ok(sizes) = svd.solve(&self.column(|point| point.value_mm), 1e-9) else {
-            return 0.0;
-        };
-        sizes.rows(first, own).amax()
-    }
-
-    /// Whether both sides of a step have two runs, and the runs next to it.
-    fn around(&self, step: usize) -> Option<[usize; 2]> {
-        let mut runs: Vec<usize> = self.points.iter().map(|point| point.run).collect();
-        runs.sort_unstable();
-        runs.dedup();
-        let at = runs.partition_point(|run| *run < step);
-        (at >= 2 && runs.len() - at >= 2).then(|| [runs[at - 1], runs[at]])
-    }
 }
 
 /// Places of the steps that the patterns have together, first runs after each.
@@ -360,6 +189,8 @@ fn steps(all: &[Series]) -> Vec<usize> {
         return vec![];
     }
     let boundaries = &runs[2..runs.len() - 1];
+    let tried = count(all.len() * boundaries.len());
+    let all = &touched::most_telling(all.to_vec(), boundaries);
     let total = |steps: &[usize]| all.iter().map(|own| own.gain(steps)).fold(0.0, f64::max);
     let best = |sets: Vec<Vec<usize>>| {
         let scored = sets.into_iter().map(|set| (total(&set), set));
@@ -373,7 +204,6 @@ fn steps(all: &[Series]) -> Vec<usize> {
         let pair = |a: &usize| later(*a).map(|b| vec![*a, *b]).collect::<Vec<_>>();
         boundaries.iter().flat_map(pair).collect()
     };
-    let tried = count(all.len() * boundaries.len());
     let mut found = Vec::<usize>::new();
     let doubled = best(pairs).filter(|pair| hold(all, pair, tried * count(boundaries.len()) / 2.0));
     if let Some(pair) = doubled {
@@ -398,7 +228,7 @@ fn hold(all: &[Series], steps: &[usize], tried: f64) -> bool {
     let together = |own: &&Series| {
         own.chance(&[], steps) * tried < MOST_CHANCE
             && own.left(own.stepped(steps)).0
-                < MOST_BESIDE_POWERS * own.left_by_time(steps.len() + 1)
+                < MOST_BESIDE_POWERS * own.left_by_time(steps.len() + 1).min(own.left_by_heat())
     };
     let shown: Vec<&Series> = all.iter().filter(together).collect();
     let each = |step: &usize| {
@@ -416,10 +246,8 @@ fn hold(all: &[Series], steps: &[usize], tried: f64) -> bool {
 fn change(all: &[Series], steps: &[usize], at: usize, config: &GapConfig) -> Option<Change> {
     let others: Vec<usize> = steps.iter().copied().filter(|s| *s != steps[at]).collect();
     let large = |own: &&Series| {
-        let (left, free) = own.left(own.stepped(steps));
-        let deviation_mm = (left / count(free.max(1))).sqrt();
         let least_mm = LEAST_FORM_ERRORS * 1e-3 * config.form_error_um;
-        own.size_mm(steps, at) > least_mm.max(LEAST_DEVIATIONS * deviation_mm)
+        own.size_mm(steps, at) > least_mm.max(LEAST_DEVIATIONS * own.deviation_mm(steps))
     };
     let tried = count(all.len() * steps.len());
     let shown: Vec<(f64, &Series)> = all
@@ -432,12 +260,21 @@ fn change(all: &[Series], steps: &[usize], at: usize, config: &GapConfig) -> Opt
     let largest = shown
         .iter()
         .max_by(|a, b| size(a.1).total_cmp(&size(b.1)))?;
+    let of: Vec<&Series> = shown.iter().map(|(_, own)| *own).collect();
+    let is_touched_alone = of.iter().all(|own| own.touch.is_some());
     Some(Change {
         between: largest.1.around(steps[at])?,
         channel: largest.1.channel.clone(),
+        feature: largest.1.feature(),
         size_mm: size(largest.1),
         chance: shown.iter().map(|(chance, _)| *chance).fold(1.0, f64::min),
-        is_set_up: shown.iter().all(|(_, own)| own.is_shared),
+        is_set_up: if is_touched_alone {
+            touched::is_of_one_that_moved(all, &of, steps, at)
+        } else {
+            of.iter().all(|own| own.is_shared)
+        },
+        is_touched_alone,
+        touches: of.iter().filter_map(|own| own.touch.clone()).collect(),
     })
 }
 
@@ -447,6 +284,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use rand_pcg::Pcg64Mcg;
 
+    use super::series::Point;
     use super::*;
 
     /// Runs of two tests in turn, ten patterns each; `of` gives what changes in the first pattern.
@@ -454,6 +292,9 @@ mod tests {
         let mut random = Pcg64Mcg::seed_from_u64(seed);
         let mut pattern = |k: usize| Series {
             channel: Channel::GridU,
+            touch: None,
+            powers: 0,
+            by_heat: vec![],
             is_shared: k == 0,
             points: (0..runs)
                 .map(|run| {

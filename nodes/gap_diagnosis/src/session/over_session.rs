@@ -38,6 +38,8 @@ const LEAST_D_OF_A_RUN: f64 = 3.0;
 const FEWEST_RUNS: usize = 5;
 /// What of a change may be left for it to be explained.
 const MOST_LEFT: f64 = 0.5;
+/// The same where touches alone show it: an effect of the machine takes half of a step that one of two blocks has.
+const MOST_LEFT_OF_TOUCHES: f64 = 0.3;
 /// Held-out runs are off by more than an effect explains where they are off by this many times what noise and the
 /// simulator's error of form give.
 const LEAST_REMAINDER: f64 = 2.0;
@@ -210,13 +212,19 @@ pub(crate) fn not_repeated(
     let is_shift = |member: &Member| found.instance(member).kind.id == changes::MOVES_ONCE;
     let has_shift = found.named().any(is_shift);
     let size_mm = |change: &Change, left_mm: f64| {
-        if left_mm > MOST_LEFT * change.size_mm {
+        let most_left = if change.is_touched_alone {
+            MOST_LEFT_OF_TOUCHES
+        } else {
+            MOST_LEFT
+        };
+        if left_mm > most_left * change.size_mm {
             return Some(left_mm);
         }
         (change.is_set_up && has_shift).then_some(change.size_mm)
     };
     let of = |change: &Change, size_mm: f64, evenly: bool| DoesNotRepeat {
         channel: change.channel.to_string(),
+        feature: change.feature.clone(),
         size_um: 1e3 * size_mm,
         last_run: number(change.between[0]),
         from_run: number(change.between[1]),
@@ -256,6 +264,7 @@ pub(crate) fn notes(named: &[OverSession], changed: &[DoesNotRepeat]) -> Vec<Not
         });
     let changed = changed.iter().map(|own| Course::DoesNotRepeat {
         channel: own.channel.clone(),
+        feature: own.feature.clone(),
         size_um: own.size_um,
         runs: [own.last_run, own.from_run],
         of_set_up: own.of_set_up,
@@ -270,10 +279,16 @@ pub(crate) fn notes(named: &[OverSession], changed: &[DoesNotRepeat]) -> Vec<Not
 }
 
 /// What the named effects leave of the held-out runs, where it is much more than noise: the confidence of each falls by the
-/// share of the gap that stays.
-pub(crate) fn remainder(found: &mut Found, shrunk: &Shrunk, config: &GapConfig) -> Option<Note> {
+/// share of the gap that stays. Without a name only what the fitted runs do not show, which have no gap (`has_gap`).
+pub(crate) fn remainder(
+    found: &mut Found,
+    shrunk: &Shrunk,
+    has_gap: bool,
+    config: &GapConfig,
+) -> Option<Note> {
     let held_out = &shrunk.held_out;
-    if shrunk.shrink.held_out_runs.is_empty() || found.named().next().is_none() {
+    let is_named = found.named().next().is_some();
+    if shrunk.shrink.held_out_runs.is_empty() || (has_gap && !is_named) {
         return None;
     }
     let mean = |of: fn(&HeldOut) -> f64| {

@@ -31,7 +31,7 @@ const FULL: &str = r#"{
 "next_experiments": [{"run": "", "separates": [""], "delta": 31.0, "minutes": 1.5}],
 "over_session": [{"effect": "backlash", "axis": "X", "from_run": 25, "holds": false, "changes_from_run": 31, "change_share": 0.2,
   "growth_share_per_h": 0.1, "chance": 0.001}],
-"does_not_repeat": [{"channel": "radial", "size_um": 5.0, "last_run": 3, "from_run": 4, "of_set_up": true,
+"does_not_repeat": [{"channel": "touch", "feature": "block_1.x", "size_um": 5.0, "last_run": 3, "from_run": 4, "of_set_up": true,
   "evenly": true, "chance": 1e-6}],
 "follows": [{"channel": "length.Z", "share": 0.97,
   "thermometers": [{"thermometer": "spindle_front", "um_per_k": 3.0, "standard_error_um_per_k": 0.02, "lag_min": 12.0}]}],
@@ -67,7 +67,7 @@ const SAMPLE: &str = r#"{ "schema": "abbe.gap/1",
   "runtime_s": 1.3 }"#;
 
 /// Keys that a report need not have, with their place.
-const OPTIONAL: [(&str, &str); 11] = [
+const OPTIONAL: [(&str, &str); 12] = [
     ("report", "over_session"),
     ("report", "does_not_repeat"),
     ("report", "follows"),
@@ -79,6 +79,7 @@ const OPTIONAL: [(&str, &str); 11] = [
     ("report", "alarms"),
     ("report.causes[]", "why"),
     ("report.does_not_repeat[]", "evenly"),
+    ("report.does_not_repeat[]", "feature"),
 ];
 
 /// Lists without an entry: of them nothing would be compared.

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use metrology::Axis;
 use nalgebra::DVector;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use twin::{Run, Session, Touch};
 
 use super::{Contrasts, POSE_RAD, weights};
-use crate::search::rows::{Block, Row, time_s};
+use crate::search::rows::{Block, Row, count, time_s};
 
 /// Touches whose axes stood further apart, mm, are of two places; latency, drift and compensation move less.
 const SAME_PLACE_MM: f64 = 1.0;
@@ -15,6 +16,21 @@ const SAME_PLACE_MM: f64 = 1.0;
 const SAME_APPROACH: f64 = 0.01;
 /// Greatest difference of two feeds that are one, as a share: they are measured.
 const SAME_MEASURED_FEED: f64 = 0.02;
+
+/// Fewest surfaces and differences that show which surface differs more than the others.
+const FEWEST_SURFACES: usize = 3;
+const FEWEST_DIFFERENCES: usize = 3;
+/// Chance that noise of a surface has more than what is still noise, and by how much surfaces may differ beside.
+const CHANCE_OF_A_SURFACE: f64 = 1e-4;
+const MOST_BESIDE: f64 = 4.0;
+
+/// Mean of so many squares over that of the middle surface from which it is not noise.
+fn most_of_middle(squares: usize) -> f64 {
+    let law = ChiSquared::new(count(squares)).ok();
+    law.map_or(f64::INFINITY, |law| {
+        MOST_BESIDE * law.inverse_cdf(1.0 - CHANCE_OF_A_SURFACE) / law.inverse_cdf(0.5)
+    })
+}
 
 /// What touches that repeat each other have in common.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -72,8 +88,48 @@ fn touch_of<'r>(run: &'r Run, row: &Row) -> Option<&'r Touch> {
     row.touch.and_then(|touch| run.touches.get(touch))
 }
 
+/// Rows and differences of touches without those of surfaces that differ far more than most: something of its own happens there, as
+/// where a block creeps in its clamp.
+pub(super) fn of_noise(
+    run: &Run,
+    block: &Block,
+    rows: &[usize],
+    values: Vec<Vec<f64>>,
+) -> (Vec<usize>, Vec<Vec<f64>>) {
+    let surface = |row: &usize| {
+        let label = touch_of(run, &block.rows[*row]).map(label);
+        label.map(|own| (own.feature, own.approach[..3].to_vec()))
+    };
+    let mut surfaces = BTreeMap::<_, Vec<usize>>::new();
+    for (place, row) in rows.iter().enumerate() {
+        surfaces.entry(surface(row)).or_default().push(place);
+    }
+    let square = |place: &usize| values.iter().map(|own| own[*place].powi(2)).sum::<f64>();
+    let mean = |places: &Vec<usize>| {
+        places.iter().map(square).sum::<f64>() / count(places.len() * values.len().max(1))
+    };
+    let mut ranked: Vec<f64> = surfaces.values().map(mean).collect();
+    ranked.sort_by(f64::total_cmp);
+    if ranked.len() < FEWEST_SURFACES || values.len() < FEWEST_DIFFERENCES {
+        return (rows.to_vec(), values);
+    }
+    let middle = ranked[(ranked.len() - 1) / 2];
+    let is_noise =
+        |places: &&Vec<usize>| mean(places) <= most_of_middle(places.len() * values.len()) * middle;
+    let mut kept: Vec<usize> = surfaces
+        .values()
+        .filter(is_noise)
+        .flatten()
+        .copied()
+        .collect();
+    kept.sort_unstable();
+    let of = |own: &Vec<f64>| kept.iter().map(|place| own[*place]).collect();
+    let values = values.iter().map(of).collect();
+    (kept.iter().map(|place| rows[*place]).collect(), values)
+}
+
 /// Whether two touches meet one place alike.
-fn is_same(a: &Touch, b: &Touch) -> bool {
+pub fn is_same_touch(a: &Touch, b: &Touch) -> bool {
     let off = |axis: &Axis| (a.position[*axis] - b.position[*axis]).abs();
     let feeds_mm_s = (a.feed_mm_s - b.feed_mm_s).abs();
     a.feature_id == b.feature_id
@@ -84,13 +140,13 @@ fn is_same(a: &Touch, b: &Touch) -> bool {
 }
 
 /// By row of `block`: the row of `other` that repeats it, each at most once.
-fn matched(session: &Session, block: &Block, other: &Block) -> Vec<Option<usize>> {
+pub(super) fn matched(session: &Session, block: &Block, other: &Block) -> Vec<Option<usize>> {
     let (one, again) = (&session.runs[block.run], &session.runs[other.run]);
     let mut free = vec![true; other.rows.len()];
     let of = |row: &Row| {
         let touch = touch_of(one, row)?;
         let repeats = |k: &usize| {
-            free[*k] && touch_of(again, &other.rows[*k]).is_some_and(|it| is_same(touch, it))
+            free[*k] && touch_of(again, &other.rows[*k]).is_some_and(|it| is_same_touch(touch, it))
         };
         let found = (0..other.rows.len()).find(repeats)?;
         free[found] = false;
@@ -125,7 +181,7 @@ mod tests {
 
     use super::*;
     use crate::preflight::rig;
-    use crate::search::rows::{Rows, count};
+    use crate::search::rows::Rows;
 
     /// Six faces of two blocks, as a cycle touches them; the deviation of each is its number, mm.
     const FACES: [(&str, [f64; 3], [f64; 3]); 6] = [
@@ -191,5 +247,28 @@ mod tests {
         session.runs = vec![cycle(&of, &[], 2.0), cycle(&of, &[0, 1, 2, 3], 2.0)];
         let rows = Rows::new(&session, &[0, 1], 60, |_| true);
         assert_eq!(super::super::groups(&session, &rows).len(), 2);
+    }
+
+    #[test]
+    fn a_surface_that_differs_far_more_than_the_others_is_not_in_the_noise() {
+        let of = rig::circles(&rig::machine(), &[50.0], 1).runs.remove(0);
+        let mut session = rig::circles(&rig::machine(), &[50.0], 1);
+        session.runs = vec![cycle(&of, &[], 2.0)];
+        let rows = Rows::new(&session, &[0], 60, |_| true);
+        let block = &rows.blocks[0];
+        let all: Vec<usize> = (0..FACES.len()).collect();
+        let values: Vec<Vec<f64>> = [1.0, -1.1, 0.9, 1.2]
+            .iter()
+            .map(|own| vec![*own, -0.8, 11.0 * own, 0.7, 1.1, -own])
+            .collect();
+        let (kept, left) = of_noise(&session.runs[0], block, &all, values.clone());
+        assert_eq!(kept, [0, 1, 3, 4, 5]);
+        assert!(left.iter().flatten().all(|own| own.abs() < 1.3), "{left:?}");
+        let alike: Vec<Vec<f64>> = values
+            .iter()
+            .map(|own| own.iter().map(|v| v.signum()).collect())
+            .collect();
+        let (kept, left) = of_noise(&session.runs[0], block, &all, alike.clone());
+        assert_eq!((kept, left), (all, alike));
     }
 }

@@ -20,6 +20,8 @@ pub enum Course {
     /// Something changed between repeats that no named effect explains, or that is no other than a set-up that moved.
     DoesNotRepeat {
         channel: String,
+        #[serde(default)]
+        feature: Option<String>,
         size_um: f64,
         runs: [u32; 2],
         of_set_up: bool,
@@ -39,7 +41,7 @@ pub enum Course {
 
 fn does_not_repeat(
     f: &mut fmt::Formatter<'_>,
-    channel: &str,
+    (channel, feature): (&str, Option<&str>),
     size_um: f64,
     [last, first]: [u32; 2],
     (of_set_up, evenly): (bool, bool),
@@ -55,9 +57,12 @@ fn does_not_repeat(
     } else {
         "no named effect explains it"
     };
+    let of = feature
+        .map(|feature| format!(" of {feature}"))
+        .unwrap_or_default();
     write!(
         f,
-        "{channel} does not repeat: {how} (chance in noise {chance:.0e}); {what}"
+        "{channel}{of} does not repeat: {how} (chance in noise {chance:.0e}); {what}"
     )
 }
 
@@ -90,12 +95,31 @@ impl fmt::Display for Course {
             Self::NotOneSize { effect, run, share } => not_one_size(f, effect, *run, *share),
             Self::DoesNotRepeat {
                 channel,
+                feature,
                 size_um,
                 runs,
                 of_set_up,
                 evenly,
                 chance,
-            } => does_not_repeat(f, channel, *size_um, *runs, (*of_set_up, *evenly), *chance),
+            } => does_not_repeat(
+                f,
+                (channel, feature.as_deref()),
+                *size_um,
+                *runs,
+                (*of_set_up, *evenly),
+                *chance,
+            ),
+            Self::Remainder {
+                effects,
+                size_um,
+                floor_um,
+                run,
+                worst_um,
+            } if effects.is_empty() => write!(
+                f,
+                "something came after the runs that were fitted: the held-out runs are off by {size_um:.2} µm rms, noise and \
+                 form give {floor_um:.2} µm; most in run {run}, {worst_um:.2} µm"
+            ),
             Self::Remainder {
                 effects,
                 size_um,

@@ -18,7 +18,8 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use twin::Session;
 
-use super::{Change, LEAST_DEVIATIONS, LEAST_FORM_ERRORS, MOST_CHANCE, Point, Series, series};
+use super::series::{Point, Series, series};
+use super::{Change, LEAST_DEVIATIONS, LEAST_FORM_ERRORS, MOST_CHANCE};
 use crate::config::GapConfig;
 use crate::search::rows::{Rows, count};
 
@@ -33,7 +34,9 @@ pub fn find(
     set_ups: &[[u32; 2]],
     config: &GapConfig,
 ) -> Vec<Change> {
-    of(&series(session, rows, rest, set_ups), config)
+    let mut all = series(session, rows, rest, set_ups);
+    all.iter_mut().for_each(|own| own.powers = 0);
+    of(&all, config)
 }
 
 fn of(all: &[Series], config: &GapConfig) -> Vec<Change> {
@@ -73,9 +76,12 @@ fn sloped(own: &Series, tried: usize, config: &GapConfig) -> Option<Change> {
     (chance < MOST_CHANCE && is_large).then(|| Change {
         between,
         channel: own.channel.clone(),
+        feature: own.feature(),
         size_mm,
         chance,
         is_set_up: own.is_shared,
+        is_touched_alone: own.touch.is_some(),
+        touches: vec![],
     })
 }
 

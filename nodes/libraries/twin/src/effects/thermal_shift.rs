@@ -14,8 +14,8 @@
 //!
 //! # Holds when
 //! The same place is read throughout, as by a displacement sensor that stands: what a body's growth makes of other places
-//! is for `column_bend`, `screw_elongation` and `workpiece_expansion`. The diagnosis tries it for logs alone, and of the
-//! thermometers that a log goes with.
+//! is for `column_bend`, `screw_elongation` and `workpiece_expansion`. The diagnosis tries it for
+//! logs, of the thermometers that a log goes with, and elsewhere in the place of a slow drift that a temperature explains better.
 //!
 //! No wider form: of a body in which heat spreads a second lag would be a part, which a log hardly tells from another first one.
 //!
