@@ -1,6 +1,6 @@
 //! One sentence for each question: where, which, how far.
 
-use gap_diagnosis::report::{Cause, GapReport, Status};
+use gap_diagnosis::report::{Cause, DoesNotRepeat, GapReport, Status};
 
 use super::logs;
 use super::words::{self, name};
@@ -84,7 +84,7 @@ fn cause(report: &GapReport) -> String {
         ));
     }
     parts.extend(report.does_not_repeat.iter().map(|change| {
-        let (channel, size) = (&change.channel, three(change.size_um));
+        let (channel, size) = (changed(change), three(change.size_um));
         let [last, from] = [change.last_run, change.from_run];
         if change.evenly {
             return format!(
@@ -100,6 +100,14 @@ fn cause(report: &GapReport) -> String {
         return "Which: no effect of the catalogue is named.".to_owned();
     }
     format!("Which: {}.", parts.join(". And "))
+}
+
+/// What does not repeat: a channel, of touches with what is touched.
+fn changed(change: &DoesNotRepeat) -> String {
+    match &change.feature {
+        Some(feature) => format!("{} of {feature}", change.channel),
+        None => change.channel.clone(),
+    }
 }
 
 /// From which run on an effect is there, where it was not from the begin.
@@ -131,6 +139,9 @@ fn sizes(cause: &Cause) -> String {
 }
 
 fn unknown(report: &GapReport) -> String {
+    if report.unknown.score <= report.unknown.threshold {
+        return "a gap of the held-out runs alone that no known effect explains".to_owned();
+    }
     let found = &report.unknown.description;
     let mut said = vec![];
     if !found.covariate.is_empty() {
