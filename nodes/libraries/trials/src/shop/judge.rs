@@ -34,6 +34,9 @@ pub struct Reported {
     pub effect: Option<Name>,
     /// The first run after it.
     pub run: u32,
+    /// Whether it is reported as the place of a set-up or a reference point.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub of_set_up: bool,
 }
 
 /// What a report and its page add to the causes.
@@ -54,12 +57,14 @@ fn changes(report: &GapReport) -> Vec<Reported> {
         runs.map(move |run| Reported {
             effect: effect.clone(),
             run,
+            of_set_up: false,
         })
     });
     let nameless = report.does_not_repeat.iter().filter(|own| !own.evenly);
     let nameless = nameless.map(|own| Reported {
         effect: None,
         run: own.from_run,
+        of_set_up: own.of_set_up,
     });
     named.chain(nameless).collect()
 }
@@ -171,6 +176,34 @@ pub fn wrong_names(verdict: &Verdict) -> Vec<(Name, Call)> {
 
 /// Whether a hidden effect was found as far as the session can tell it: by its name, or in the set.
 pub fn is_found(verdict: &Verdict, effect: &ShopEffect) -> bool {
+    is_found_by_name(verdict, effect) || is_reported_as_set_up(verdict, effect)
+}
+
+/// Name of a reference point that shifts.
+const REFERENCE: &str = "homing_shift";
+
+/// Whether a shift of a reference point, which other effects imitate, is reported with its instant as one of a reference point
+/// or of what is touched: that is a set as well.
+fn is_reported_as_set_up(verdict: &Verdict, effect: &ShopEffect) -> bool {
+    let is_reference = effect.names.iter().any(|(id, _)| id == REFERENCE);
+    let (Some(truth), Some(answer), Some(change)) =
+        (&verdict.truth.shop, &verdict.shop, &effect.change)
+    else {
+        return false;
+    };
+    is_reference
+        && !effect.is_resolvable()
+        && answer.changes.iter().any(|own| {
+            let begin_s = truth
+                .shift
+                .as_ref()
+                .and_then(|times| times.begin_s(own.run));
+            let [before_s, after_s] = change.between_s;
+            own.of_set_up && begin_s.is_some_and(|at_s| before_s < at_s && at_s <= after_s)
+        })
+}
+
+fn is_found_by_name(verdict: &Verdict, effect: &ShopEffect) -> bool {
     let wanted = if effect.is_resolvable() {
         Call::Right
     } else {
@@ -316,13 +349,51 @@ mod tests {
     }
 
     #[test]
+    fn a_reference_that_shifts_is_found_as_a_set_up_or_a_reference_point_at_its_instant() {
+        let mut effect = play(vec![]).effects.remove(0);
+        effect.names = vec![name("homing_shift", "X")];
+        effect.same_readings = vec![name("coolant", "X")];
+        effect.change = Some(Change {
+            at_s: 1700.0,
+            between_s: [1500.0, 2900.0],
+        });
+        let mut truth = play(vec![]);
+        truth.shift = Some(shift());
+        let is_found_with = |run: u32, of_set_up: bool, effect: &ShopEffect| {
+            let own = Reported {
+                effect: None,
+                run,
+                of_set_up,
+            };
+            let mut verdict = answered(vec![], vec![own]);
+            verdict.truth.shop = Some(truth.clone());
+            is_found(&verdict, effect)
+        };
+        assert!(is_found_with(9, true, &effect));
+        assert!(
+            !is_found_with(9, false, &effect),
+            "a change, of what is open"
+        );
+        assert!(!is_found_with(12, true, &effect), "another instant");
+        effect.same_readings = vec![];
+        assert!(!is_found_with(9, true, &effect), "it has a name here");
+    }
+
+    #[test]
     fn an_instant_is_right_within_a_cycle_or_between_the_tests_that_show_it() {
         let mut effect = play(vec![]).effects.remove(0);
         effect.change = Some(Change {
             at_s: 1700.0,
             between_s: [1500.0, 2900.0],
         });
-        let run = |effect: Option<Name>, run: u32| vec![Reported { effect, run }];
+        let run = |effect: Option<Name>, run: u32| {
+            let of_set_up = false;
+            vec![Reported {
+                effect,
+                run,
+                of_set_up,
+            }]
+        };
         let has = |changes| has_instant(&answered(vec![], changes), &shift(), &effect);
         assert!(has(run(None, 9)) && has(run(Some(name("backlash", "X")), 9)));
         assert!(!has(run(Some(name("backlash", "Y")), 9)), "another axis");

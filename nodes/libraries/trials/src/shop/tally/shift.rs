@@ -122,7 +122,11 @@ mod tests {
                 cycle_s: 2000.0,
             }),
         });
-        let reported = |run| Reported { effect: None, run };
+        let reported = |run| Reported {
+            effect: None,
+            run,
+            of_set_up: false,
+        };
         verdict.shop = Some(Answer {
             changes: told.into_iter().map(reported).collect(),
             ..Answer::default()
