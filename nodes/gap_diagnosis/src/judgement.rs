@@ -7,6 +7,7 @@ pub(crate) mod along;
 pub(crate) mod aside;
 pub(crate) mod at_instant;
 pub(crate) mod by_clock;
+pub(crate) mod by_heat;
 pub(crate) mod by_thermometer;
 pub(crate) mod cause;
 pub(crate) mod confidence;

@@ -16,6 +16,7 @@ use crate::config::GapConfig;
 use crate::judgement::aside;
 use crate::judgement::at_instant;
 use crate::judgement::by_clock;
+use crate::judgement::by_heat;
 use crate::judgement::by_thermometer;
 use crate::judgement::form_doubt;
 use crate::judgement::plain::{plainest, straightened};
@@ -153,6 +154,7 @@ fn list_look_alikes(
     other_thermometer::list(stack, signatures, members, thermometers);
     with_heat::list(stack, signatures, members);
     at_instant::list(stack, signatures, members);
+    by_heat::list(stack, signatures, members, scope.config);
 }
 
 /// Searches the catalogue.

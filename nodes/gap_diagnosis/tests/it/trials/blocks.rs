@@ -81,14 +81,23 @@ fn shift(seed: u64, blocks: usize, moves: &Moves) -> Session {
     session
 }
 
-/// The same with a thermometer at the column, which warms by 6 K with the morning and falls again.
-fn with_column(mut session: Session) -> (MachineFile, Session) {
-    let sensors = "temperature_sensors:\n  - {id: column, place: column, period_s: 60.0}\n";
+/// The same with a thermometer at the column, which warms by 6 K with the morning and falls again, and others that warm in proportion.
+fn with_column(mut session: Session, others: &[&str]) -> (MachineFile, Session) {
+    let mut sensors =
+        "temperature_sensors:\n  - {id: column, place: column, period_s: 60.0}\n".to_owned();
+    for place in others {
+        sensors += &format!("  - {{id: {place}, place: {place}, period_s: 60.0}}\n");
+    }
     let text = include_str!("../../../../../launch_configs/grid_xy/machine.yaml");
     let file = MachineFile::parse(&format!("{text}\n{sensors}"), "grid_xy");
     session.history.step_s = 60.0;
-    let series = (0..250).map(|minute| 20.0 + warming_k(60.0 * f64::from(minute)));
-    session.history.temperature_degc = [("column".to_owned(), series.collect())].into();
+    let series = |share: f64| {
+        let at = move |minute: i32| 20.0 + share * warming_k(60.0 * f64::from(minute));
+        (0..250).map(at).collect()
+    };
+    let all = [&["column"], others].concat().into_iter().enumerate();
+    let series = all.map(|(n, id)| (id.to_owned(), series(1.0 / (n + 1) as f64)));
+    session.history.temperature_degc = series.collect();
     (file.expect("the plant is sound"), session)
 }
 
@@ -259,29 +268,42 @@ fn what_warms_between_cycles_is_no_noise_of_touches() {
 }
 
 /// A column that leans along Y with its temperature, half an hour late, by two bodies one behind the other.
+fn leans(_: usize, axis: usize, time_s: f64) -> f64 {
+    let (mut first, mut second, step_s) = (0.0, 0.0, 10.0);
+    let mut at_s = 0.0;
+    while at_s < time_s {
+        first += (warming_k(at_s) - first) * step_s / 900.0;
+        second += (first - second) * step_s / 900.0;
+        at_s += step_s;
+    }
+    2e-3 * f64::from(u8::from(axis == 1)) * second
+}
+
 #[test]
 fn touches_that_go_with_a_thermometer_are_named_with_it() {
-    let lagged = |time_s: f64| {
-        let (mut first, mut second, step_s) = (0.0, 0.0, 10.0);
-        let mut at_s = 0.0;
-        while at_s < time_s {
-            first += (warming_k(at_s) - first) * step_s / 900.0;
-            second += (first - second) * step_s / 900.0;
-            at_s += step_s;
-        }
-        second
-    };
     for seed in 50..53 {
-        let leans = move |_: usize, axis: usize, time_s: f64| {
-            2e-3 * f64::from(u8::from(axis == 1)) * lagged(time_s)
-        };
-        let (file, session) = with_column(shift(seed, 2, &leans));
+        let (file, session) = with_column(shift(seed, 2, &leans), &[]);
         let diagnosis = diagnose(&file, &session, &GapConfig::default()).expect("a diagnosis");
         let all = told(&diagnosis);
         let right = ["thermal_shift column", "column_bend "];
         let found = names(&diagnosis);
         assert!(!found.is_empty(), "{all}");
         assert!(found.iter().all(|name| right.contains(&&**name)), "{all}");
+    }
+}
+
+#[test]
+fn a_thermometer_that_warms_in_proportion_stands_with_the_one_that_is_named() {
+    for seed in 54..57 {
+        let (file, session) = with_column(shift(seed, 2, &leans), &["bed"]);
+        let diagnosis = diagnose(&file, &session, &GapConfig::default()).expect("a diagnosis");
+        let all = told(&diagnosis);
+        let mut causes = diagnosis.report.causes.iter();
+        let cause = causes.find(|cause| cause.status != Status::Surrogate);
+        let cause = cause.unwrap_or_else(|| panic!("{all}"));
+        assert_eq!(cause.status, Status::Set, "{all}");
+        let mut ids = cause.confusable_with.iter().map(|own| &*own.axis);
+        assert!(ids.any(|id| id == "bed") || cause.axis == "bed", "{all}");
     }
 }
 
