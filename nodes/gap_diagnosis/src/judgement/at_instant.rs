@@ -10,7 +10,7 @@
 //!   |f - U U'f| < 3                                                       (1)
 //! ```
 //!
-//! lists the other with it, whatever its form costs. What begins at that run, as wear does, is another one.
+//! lists the other with it, whatever its form costs. Wear that begins where touches alone show a change is another one.
 //!
 //! # Holds when
 //! The instant of what was found is that of a change of the session (`changes`).
@@ -39,7 +39,9 @@ pub(crate) fn list(stack: &Stack<'_>, signatures: &Library, members: &mut [Membe
         };
         let found = stack.signature(&*own.effect(&member.estimate.values));
         let is_other = |rival: &&Instance| {
-            let is_begun = |begins: Begins| span_s[0] < begins.at_s && begins.at_s <= span_s[1];
+            let is_begun = |begins: Begins| {
+                begins.is_touched_alone && span_s[0] < begins.at_s && begins.at_s <= span_s[1]
+            };
             rival.name() != own.name()
                 && rival
                     .begins
@@ -58,7 +60,7 @@ fn span_s(stack: &Stack<'_>, own: &Instance, values: &[f64]) -> Option<[f64; 2]>
     let begins = |run: &usize| begin_s(&stack.session.runs[*run]);
     let all = || stack.runs.iter().filter_map(begins);
     match (own.begins, instant(own)) {
-        (Some(begun), _) => {
+        (Some(begun), _) if begun.is_touched_alone => {
             let events = stack.events_s.iter().copied();
             let before = events.filter(|at_s| *at_s < begun.at_s).reduce(f64::max);
             before.map(|at_s| [at_s, begun.at_s])
@@ -68,7 +70,7 @@ fn span_s(stack: &Stack<'_>, own: &Instance, values: &[f64]) -> Option<[f64; 2]>
             let next = all().filter(|begin_s| *begin_s > at_s).reduce(f64::min);
             Some([at_s, next.unwrap_or(at_s)])
         }
-        (None, None) => None,
+        _ => None,
     }
 }
 

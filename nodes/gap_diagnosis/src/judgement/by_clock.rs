@@ -92,17 +92,25 @@ fn best_gain(
     gains.fold(0.0, f64::max)
 }
 
+/// Shifts with temperatures that are searched in the place of slow drifts, and the directions of these.
+#[derive(Default)]
+pub(crate) struct InPlace {
+    /// One for each thermometer.
+    pub(crate) instances: Vec<Instance>,
+    axes: BTreeSet<usize>,
+}
+
 /// Shifts with the thermometers that do best in the place of the slow drifts which fail (1), for recordings that are no logs.
-pub(crate) fn shifts(scope: &Scope<'_, '_>, found: &Found) -> Vec<Instance> {
+pub(crate) fn in_place(scope: &Scope<'_, '_>, found: &Found) -> InPlace {
     let stack = scope.stack;
     let is_left_out = scope.config.left_out.iter().any(|id| id == SHIFT);
     let is_asked = !is_left_out && !log::is_of_logs(stack);
     let Some(kind) = effects::kind(SHIFT).filter(|_| is_asked) else {
-        return vec![];
+        return InPlace::default();
     };
     let fails =
         |check: &Check| check.check == CheckId::BeatsHeat && check.verdict == Verdict::Failed;
-    let mut ids = BTreeSet::<&String>::new();
+    let (mut ids, mut axes) = (BTreeSet::<&String>::new(), BTreeSet::new());
     for member in &found.members {
         let own = found.instance(member);
         let (true, Target::Axis(axis)) = (member.checks.iter().any(fails), &own.target) else {
@@ -119,26 +127,44 @@ pub(crate) fn shifts(scope: &Scope<'_, '_>, found: &Found) -> Vec<Instance> {
         let most = gains.iter().map(|own| own.0).fold(0.0, f64::max);
         let near = gains.iter().filter(|own| own.0 >= NEAR_THE_BEST * most);
         ids.extend(near.map(|own| own.1));
+        axes.insert(axis.index());
     }
-    ids.into_iter()
-        .map(|id| Instance {
-            kind,
-            target: Target::Thermometer(id.clone()),
-            begins: None,
-        })
-        .collect()
+    let of = |id: &String| Instance {
+        kind,
+        target: Target::Thermometer(id.clone()),
+        begins: None,
+    };
+    InPlace {
+        instances: ids.into_iter().map(of).collect(),
+        axes,
+    }
 }
 
-/// Adds the forms of shifts with a temperature along one direction: a body that grows along it needs no other.
-pub(crate) fn add_along_one(signatures: &mut Library) {
-    for form in 0..signatures.forms.len() {
-        let own = &signatures.forms[form];
-        let sizes = own.amplitudes.len();
-        if signatures.instances[own.instance].kind.id == SHIFT && sizes > 1 {
-            for size in 0..sizes {
-                signatures.add_part(form, &[size]);
+impl InPlace {
+    /// Leaves of the forms of these shifts those along one of the directions: another direction is another effect's.
+    pub(crate) fn keep_own(&self, signatures: &mut Library) {
+        if self.instances.is_empty() {
+            return;
+        }
+        let is_shift = |signatures: &Library, form: usize| {
+            let instance = &signatures.instances[signatures.forms[form].instance];
+            instance.kind.id == SHIFT
+        };
+        let wholes = signatures.forms.len();
+        for form in (0..wholes)
+            .filter(|form| is_shift(signatures, *form))
+            .collect::<Vec<_>>()
+        {
+            let sizes = signatures.forms[form].amplitudes.clone();
+            for own in (0..sizes.len()).filter(|own| self.axes.contains(&sizes[*own])) {
+                signatures.add_part(form, &[own]);
             }
         }
+        let kept: Vec<bool> = (0..signatures.forms.len())
+            .map(|form| form >= wholes || !is_shift(signatures, form))
+            .collect();
+        let mut kept = kept.into_iter();
+        signatures.forms.retain(|_| kept.next().unwrap_or(true));
     }
 }
 

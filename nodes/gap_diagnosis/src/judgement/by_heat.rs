@@ -8,7 +8,7 @@
 //!   |f - U U'f| < 3                                                       (1)
 //! ```
 //!
-//! lists that shift with it. Thermometers that drive the effect itself are not listed: its own form says more.
+//! lists that shift with it. An effect that follows a thermometer of its own which was read is known by that.
 //!
 //! # Holds when
 //! The recording is no log: of these `other_thermometer` lists what predicts as well.
@@ -55,8 +55,10 @@ pub(crate) fn list(
             continue;
         }
         let found = stack.signature(&*own.effect(&member.estimate.values));
-        let drivers = drivers_of(stack, own.kind.id, &own.target);
-        for id in read.keys().filter(|id| !drivers.contains(id)) {
+        if !drivers_of(stack, own.kind.id, &own.target).is_empty() {
+            continue;
+        }
+        for id in read.keys() {
             if let Some(cos) = cosine(stack, &found, kind, id) {
                 unresolved::list(member, SHIFT, id, cos);
             }

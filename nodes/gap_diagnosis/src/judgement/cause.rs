@@ -15,7 +15,7 @@ use twin::effects::{Kind, Moment, Parameter, Role};
 use crate::config::GapConfig;
 use crate::judgement::aside;
 use crate::judgement::at_instant;
-use crate::judgement::by_clock;
+use crate::judgement::by_clock::{self, InPlace};
 use crate::judgement::by_heat;
 use crate::judgement::by_thermometer;
 use crate::judgement::form_doubt;
@@ -166,11 +166,12 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let thermometers = thermal::notes(stack);
     instances.retain(|own| !by_thermometer::is_of_another(stack, own, &thermometers));
     instances.extend(by_thermometer::shifts(scope, &thermometers));
-    let found = found_among(scope, instances.clone(), &thermometers);
-    let warmer = by_clock::shifts(scope, &found);
-    if !warmer.is_empty() {
-        let more = [instances.clone(), warmer].concat();
-        let warmed = found_among(scope, more, &thermometers);
+    let none = InPlace::default();
+    let found = found_among(scope, instances.clone(), &thermometers, &none);
+    let shifts = by_clock::in_place(scope, &found);
+    if !shifts.instances.is_empty() {
+        let more = [&*instances, &*shifts.instances].concat();
+        let warmed = found_among(scope, more, &thermometers, &shifts);
         let is_shift = |member: &Member| warmed.instance(member).kind.id == by_thermometer::SHIFT;
         if warmed.named().any(is_shift) {
             return warmed;
@@ -181,17 +182,22 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
         return found;
     }
     instances.retain(|own| !by_thermometer::is_driven_by_none(stack, own, &thermometers));
-    let mut instead = found_among(scope, instances, &thermometers);
+    let mut instead = found_among(scope, instances, &thermometers, &none);
     let has_any = by_thermometer::list_hiding(stack, &mut instead, &hiding);
     if has_any { instead } else { found }
 }
 
 /// Searches some instances.
-fn found_among(scope: &Scope<'_, '_>, instances: Vec<Instance>, thermometers: &[Note]) -> Found {
+fn found_among(
+    scope: &Scope<'_, '_>,
+    instances: Vec<Instance>,
+    thermometers: &[Note],
+    shifts: &InPlace,
+) -> Found {
     let stack = scope.stack;
     let mut signatures = Library::new(stack, instances);
+    shifts.keep_own(&mut signatures);
     lines::add(stack, scope.slots, &mut signatures);
-    by_clock::add_along_one(&mut signatures);
     widening::widen_curves(stack, &mut signatures);
     let mut normal = signatures.normal(&stack.z);
     [signatures.aside, signatures.shared] = aside::set_aside(stack, &signatures, &normal);
