@@ -1,7 +1,7 @@
 //! What DDS and Zenoh give a cell of three hosts: delay, loss, a cut link, memory and CPU.
 //!
 //! Without arguments short runs over Zenoh, judged: links that lose, links that are cut again and again, and computers whose
-//! clocks differ; `-- cell`, `-- cuts` and `-- clocks` run one of them.
+//! clocks differ, and a secured cell with a stranger; `-- cell`, `-- cuts`, `-- clocks` and `-- secured` run one of them.
 //! `cargo test --release --test backends --features abbe/zenoh -- 66` runs a cell over both, each with a link that is cut for
 //! 66 s, and prints the table of nodes/libraries/node_runtime/BACKENDS.md.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
@@ -22,6 +22,7 @@ mod cell;
 mod clocks;
 mod cuts;
 mod figures;
+mod secured;
 
 use cell::Times;
 
@@ -37,7 +38,7 @@ const SHORT: Times = Times {
 const RECOVERY_S: f64 = 3.0;
 
 /// The short runs, each of which can be asked for alone.
-const RUNS: [&str; 3] = ["cell", "cuts", "clocks"];
+const RUNS: [&str; 4] = ["cell", "cuts", "clocks", "secured"];
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -72,6 +73,7 @@ fn is_as_wanted(run: &str, python: &PathBuf) -> bool {
             seen.is_well(RECOVERY_S)
         }),
         "cuts" => cuts::are_over_within(RECOVERY_S, python),
+        "secured" => secured::keeps_strangers_out(python),
         _ => clocks::are_no_matter(RECOVERY_S, python),
     };
     seen.unwrap_or(true)

@@ -1,7 +1,11 @@
 """PyPI eclipse-zenoh as the other side of a graph over Zenoh, and as its router.
 
     zenoh_peer.py router FILE ENDPOINT [ROUTER...] by a configuration, until standard input ends
+    zenoh_peer.py secured FILE FOLDER HOST [ROUTER...]
+                                                   the same with a host's certificate, as FILE listens
     zenoh_peer.py meet ENDPOINT DOMAIN             meets a fake_cnc, says as JSON what it saw
+
+With ABBE_ROUTER=PROGRAM the router is that program, a `zenohd`.
 
 Keys, tokens and attachments are written here from the design of rmw_zenoh, type hashes are those of
 PyPI rosbags: nothing is taken from the side under test.
@@ -10,8 +14,11 @@ PyPI rosbags: nothing is taken from the side under test.
 from __future__ import annotations
 
 import json
+import os
 import struct
+import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -36,15 +43,62 @@ def config(listen: list[str], connect: list[str]) -> zenoh.Config:
     return made
 
 
-def route(file: str, endpoint: str, others: list[str]) -> None:
+def route(file: str, settings: dict) -> None:
+    program = os.environ.get("ABBE_ROUTER")
+    if program is not None:
+        route_by(program, file, settings)
+        return
     # As rmw_zenohd does.
     zenoh.init_log_from_env_or("error")
     made = zenoh.Config.from_file(file)
-    made.insert_json5("listen/endpoints", json.dumps([endpoint]))
-    made.insert_json5("connect/endpoints", json.dumps(others))
+    for key, value in settings.items():
+        made.insert_json5(key, json.dumps(value))
     with zenoh.open(made):
         print("listening", flush=True)
         sys.stdin.read()
+
+
+def route_by(program: str, file: str, settings: dict) -> None:
+    """The same by `zenohd` itself."""
+    words = [program, "--config", file]
+    for key, value in settings.items():
+        words += ["--cfg", f"{key}:{json.dumps(value)}"]
+    router = subprocess.Popen(
+        words,
+        env=os.environ | {"RUST_LOG": "info"},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    for line in router.stdout:
+        if "can be reached at" in line:
+            break
+    else:
+        sys.exit(f"{program} ended with {router.wait()}")
+    print("listening", flush=True)
+    # Where nobody reads them, its lines stop it once the pipe is full.
+    threading.Thread(target=forward, args=[router.stdout]).start()
+    sys.stdin.read()
+    router.terminate()
+    router.wait()
+
+
+def forward(lines) -> None:
+    for line in lines:
+        print(line, end="", flush=True)
+
+
+def certificates(folder: str, host: str) -> dict:
+    """Settings that give a session or router the certificate of a host."""
+    tls, own = "transport/link/tls", f"{folder}/{host}"
+    return {
+        f"{tls}/root_ca_certificate": f"{folder}/ca.pem",
+        f"{tls}/listen_private_key": f"{own}.key",
+        f"{tls}/listen_certificate": f"{own}.pem",
+        f"{tls}/connect_private_key": f"{own}.key",
+        f"{tls}/connect_certificate": f"{own}.pem",
+    }
 
 
 def attachment(number: int) -> bytes:
@@ -293,7 +347,9 @@ def meet(endpoint: str, domain: int) -> None:
 if __name__ == "__main__":
     match sys.argv[1:]:
         case ["router", file, endpoint, *others]:
-            route(file, endpoint, others)
+            route(file, {"listen/endpoints": [endpoint], "connect/endpoints": others})
+        case ["secured", file, folder, host, *others]:
+            route(file, certificates(folder, host) | {"connect/endpoints": others})
         case ["meet", endpoint, domain]:
             meet(endpoint, int(domain))
         case _:

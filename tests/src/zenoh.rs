@@ -4,7 +4,7 @@
 //! ([`environment`]); [`Router`] is one of other people's software, PyPI `eclipse-zenoh`.
 
 use std::io::{BufRead, BufReader};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread::JoinHandle;
 
@@ -72,6 +72,9 @@ pub fn put_on_it(command: &mut Command, domain: u16) {
 /// How a router is configured that we give to users.
 const ROUTER: &str = "launch_configs/three_hosts/zenoh_router.json5";
 
+/// The same for a network that others use too: TLS and access control.
+const SECURED_ROUTER: &str = "launch_configs/three_hosts/zenoh_router_tls.json5";
+
 /// What BACKENDS.md tells users to start one with: closing a dead link holds a thread of the two for 10 s.
 const RUNTIME: (&str, &str) = (
     "ZENOH_RUNTIME",
@@ -93,6 +96,29 @@ impl Router {
     /// When it does not listen.
     #[must_use]
     pub fn start(python: &PathBuf, wrapped: &[&str], endpoint: &str, connect: &[String]) -> Self {
+        let file = root().join(ROUTER).display().to_string();
+        let words = ["router".to_owned(), file, endpoint.to_owned()];
+        Self::of(python, wrapped, &[&words, connect].concat())
+    }
+
+    /// Starts one by the secured configuration that is shipped, with the certificate of `host` in `folder`.
+    ///
+    /// # Panics
+    /// When it does not listen.
+    #[must_use]
+    pub fn secured(
+        python: &PathBuf,
+        wrapped: &[&str],
+        (folder, host): (&Path, &str),
+        connect: &[String],
+    ) -> Self {
+        let file = root().join(SECURED_ROUTER).display().to_string();
+        let folder = folder.display().to_string();
+        let words = ["secured".to_owned(), file, folder, host.to_owned()];
+        Self::of(python, wrapped, &[&words, connect].concat())
+    }
+
+    fn of(python: &PathBuf, wrapped: &[&str], arguments: &[String]) -> Self {
         let plain = script(python, "zenoh_peer.py");
         let mut words = wrapped.iter().map(|word| (*word).into());
         let own = std::iter::once(plain.get_program().to_owned());
@@ -108,10 +134,7 @@ impl Router {
         };
         let mut child = command
             .env(RUNTIME.0, RUNTIME.1)
-            .arg("router")
-            .arg(root().join(ROUTER))
-            .arg(endpoint)
-            .args(connect)
+            .args(arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -120,7 +143,7 @@ impl Router {
         let mut first = String::new();
         let mut output = BufReader::new(child.stdout.take().unwrap());
         output.read_line(&mut first).unwrap();
-        assert_eq!(first.trim(), "listening", "router at {endpoint}");
+        assert_eq!(first.trim(), "listening", "router {}", arguments.join(" "));
         // A router whose complaints nobody reads stands still once the pipe is full.
         let said = std::thread::spawn(|| output.lines().map_while(Result::ok).collect());
         Self {

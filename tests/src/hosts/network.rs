@@ -3,7 +3,7 @@
 //! Nothing of the computer's own network is touched: each tap is made inside its namespace, and with the namespaces everything is
 //! gone, also when a test fails.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -171,6 +171,23 @@ impl Network {
         }
     }
 
+    /// The same by the secured configuration, for the hosts whose certificate is in `folder`.
+    pub fn over_secured_zenoh(&mut self, python: &PathBuf, folder: &Path) {
+        for place in 0..self.hosts.len() {
+            let host = &self.hosts[place].0;
+            if !folder.join(host).with_extension("pem").is_file() {
+                continue;
+            }
+            let inside = self.inside(place);
+            let inside: Vec<&str> = inside.iter().map(String::as_str).collect();
+            let earlier: Vec<String> = (0..place)
+                .map(|place| format!("tls/{}:7448", address(place)))
+                .collect();
+            let router = Router::secured(python, &inside, (folder, host), &earlier);
+            self.routers.push(router);
+        }
+    }
+
     /// Ends the routers, when the nodes have ended; each host with the lines that its router complained in.
     pub fn end_routers(&mut self) -> Vec<(String, Vec<String>)> {
         let hosts = self.hosts.iter().map(|(name, _)| name.clone());
@@ -285,7 +302,8 @@ impl Network {
 }
 
 /// The address of the host at a place.
-fn address(place: usize) -> String {
+#[must_use]
+pub fn address(place: usize) -> String {
     format!("10.77.0.{}", place + 1)
 }
 
