@@ -13,8 +13,10 @@ PyPI rosbags: nothing is taken from the side under test.
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
+import signal
 import struct
 import subprocess
 import sys
@@ -30,6 +32,7 @@ MSGS = Path(__file__).resolve().parents[2] / "msgs"
 GOAL = bytes(range(16))
 SENDER = bytes(range(100, 116))
 CDR = bytes([0, 1, 0, 0])
+PR_SET_PDEATHSIG = 1
 
 
 def config(listen: list[str], connect: list[str]) -> zenoh.Config:
@@ -66,6 +69,7 @@ def route_by(program: str, file: str, settings: dict) -> None:
     router = subprocess.Popen(
         words,
         env=os.environ | {"RUST_LOG": "info"},
+        preexec_fn=end_with_parent,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -82,6 +86,11 @@ def route_by(program: str, file: str, settings: dict) -> None:
     sys.stdin.read()
     router.terminate()
     router.wait()
+
+
+def end_with_parent() -> None:
+    """A script that is killed ends no router: the kernel does."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def forward(lines) -> None:

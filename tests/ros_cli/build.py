@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -64,6 +65,15 @@ def messages(desk: Desk, msgs: Path) -> bool:
         return False
     desk.env = sourced(desk, setup)
     return True
+
+
+def hash_of(desk: Desk, name: str) -> str:
+    """The hash that colcon gave a type such as `msg/AxisState`; no hash where it has none."""
+    _, said = desk.run(["ros2", "pkg", "prefix", "--share", "abbe_msgs"], 20.0)
+    file = Path(said.strip()) / f"{name}.json"
+    whole = json.loads(file.read_text()) if file.is_file() else {"type_hashes": []}
+    hashes = {entry["type_name"]: entry["hash_string"] for entry in whole["type_hashes"]}
+    return hashes.get(f"abbe_msgs/{name}", "no hash")
 
 
 def fields(text: str) -> list[str]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 
+from build import hash_of
 from cell import NODES
 from desk import Desk
+from router import ZENOH
 
 DISCOVERY_S = 20.0
 BACKGROUND_RATE_HZ = 10.0
@@ -76,6 +78,18 @@ def topics(desk: Desk) -> None:
         "a latched topic says so",
         ["ros2", "topic", "info", "-v", "/thermal/model"],
         r"Node name: thermal_model\n(.*\n)*? +Durability: TRANSIENT_LOCAL",
+    )
+
+
+def type_hashes(desk: Desk) -> None:
+    """Over Zenoh each end has the hash that colcon gave its type; over DDS ours send none."""
+    is_zenoh = desk.env.get("RMW_IMPLEMENTATION") == ZENOH
+    wanted = hash_of(desk, "msg/AxisState") if is_zenoh else "INVALID"
+    desk.see(
+        "the type's hash",
+        ["ros2", "topic", "info", "-v", "/axes/state"],
+        rf"Node name: fake_cnc\nNode namespace: /\n.*\nTopic type hash: {wanted}\nEndpoint type: PUBLISHER",
+        rf"Node name: probe\nNode namespace: /\n.*\nTopic type hash: {wanted}\nEndpoint type: SUBSCRIPTION",
     )
 
 

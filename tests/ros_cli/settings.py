@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
+from build import hash_of
 from desk import Desk
 
 FROZEN = "parameters are frozen after start"
@@ -91,16 +89,10 @@ DESCRIBED = ["msg/AxisState", "msg/GapReport", "action/RunProgram"]
 
 def type_descriptions(desk: Desk) -> None:
     """A node knows its types by the hashes that colcon gave them."""
-    code, said = desk.run(["ros2", "pkg", "prefix", "--share", "abbe_msgs"], 20.0)
-    if code != 0:
-        desk.lack("hashes of types", "ros2 pkg prefix --share abbe_msgs has no answer")
-        return
     kind = "type_description_interfaces/srv/GetTypeDescription"
     for name in DESCRIBED:
-        whole = json.loads((Path(said.strip()) / f"{name}.json").read_text())
-        hashes = {entry["type_name"]: entry["hash_string"] for entry in whole["type_hashes"]}
         full = f"abbe_msgs/{name}"
-        request = f"{{type_name: {full}, type_hash: {hashes[full]}, include_type_sources: false}}"
+        request = f"{{type_name: {full}, type_hash: {hash_of(desk, name)}, include_type_sources: false}}"
         desk.see(
             "a type is described under the hash that colcon gave it",
             calling("/fake_cnc/get_type_description", kind, request),
