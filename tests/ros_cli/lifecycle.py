@@ -6,6 +6,7 @@ import re
 import time
 
 from desk import Desk
+from router import ZENOH
 
 NODE = "/axis_compensation"
 MANAGED = [NODE, "/fake_cnc"]
@@ -87,6 +88,9 @@ def lifecycle(desk: Desk) -> None:
     step(desk, "activate")
     state(desk, "active", 3)
     desk.end(events, 10.0)
+    if not has_our_event(desk):
+        desk.lack("every step is told", "this ROS 2 has another TransitionEvent (docs/limits.md)")
+        return
     said = events.said()
     goals = re.findall(r"goal_state:\n  id: \d+\n  label: (\w+)", said)
     wanted = "deactivating inactive cleaningup unconfigured configuring inactive activating active"
@@ -111,6 +115,19 @@ def silent(desk: Desk) -> None:
     )
 
 
+def listed(said: str) -> list[str]:
+    """The steps alone: a command may warn of something else before them."""
+    return [line for line in said.splitlines() if line.startswith(("- ", "\t"))]
+
+
+def has_our_event(desk: Desk) -> bool:
+    """Whether samples of ours reach this ROS 2: over Zenoh only those of the same definition do."""
+    if desk.env.get("RMW_IMPLEMENTATION") != ZENOH:
+        return True
+    _, said = desk.run(["ros2", "interface", "show", "lifecycle_msgs/msg/TransitionEvent"], 20.0)
+    return re.search(r"^uint64 timestamp", said, re.MULTILINE) is not None
+
+
 def same_steps(desk: Desk) -> None:
     """All steps of our node are those of a node of ROS 2's own."""
     peer = desk.start("lifecycle_peer", "python3", "-c", PEER_PROGRAM)
@@ -122,6 +139,6 @@ def same_steps(desk: Desk) -> None:
     )
     _, ours = desk.run(["ros2", "lifecycle", "list", "-a", NODE], 20.0)
     steps = said.count("Goal: ")
-    right = ours == said and steps > 20
+    right = listed(ours) == listed(said) and steps > 20
     desk.judge("ours has the same steps", f"{steps} steps, equal", right, f"{ours.count('Goal: ')} steps", ours)
     desk.end(peer, 10.0)

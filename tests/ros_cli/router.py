@@ -29,9 +29,9 @@ def start(desk: Desk, root: Path) -> bool:
     port = free_port()
     endpoints = json.dumps([f"tcp/127.0.0.1:{port}"])
     words = started_by(desk, str(root / CONFIGURATION), endpoints)
+    router = desk.start("router", *words)
     desk.env["ZENOH_CONFIG_OVERRIDE"] = f"connect/endpoints={endpoints}"
     desk.env["ZENOH_ROUTER_CHECK_ATTEMPTS"] = "10"
-    router = desk.start("router", *words)
     deadline = time.monotonic() + START_S
     is_there = False
     while not is_there and time.monotonic() < deadline:
