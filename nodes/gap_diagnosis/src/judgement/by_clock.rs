@@ -14,7 +14,7 @@
 //! Where no thermometer was read (for a growth: none at the spindle), a growth or a coolant's step is known by its course in time alone,
 //! and the drift is listed with it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use metrology::Axis;
 use nalgebra::DVector;
@@ -39,6 +39,8 @@ const GROWTH: &str = "spindle_growth";
 const LAGS_MIN: [f64; 5] = [0.05, 8.0, 25.0, 80.0, 240.0];
 /// The largest shift of a tip that a machine has, µm/K.
 const MOST_UM_PER_K: f64 = 50.0;
+/// What a drift may lose to be listed with the shift in its place: odds of one in twenty.
+const MOST_LOST: f64 = 6.0;
 /// Share of the best gain from which a thermometer is tried beside the best.
 const NEAR_THE_BEST: f64 = 0.8;
 
@@ -97,7 +99,8 @@ fn best_gain(
 pub(crate) struct InPlace {
     /// One for each thermometer.
     pub(crate) instances: Vec<Instance>,
-    axes: BTreeSet<usize>,
+    /// By the axis of a drift what it loses (1).
+    lost: BTreeMap<usize, f64>,
 }
 
 /// Shifts with the thermometers that do best in the place of the slow drifts which fail (1), for recordings that are no logs.
@@ -110,10 +113,11 @@ pub(crate) fn in_place(scope: &Scope<'_, '_>, found: &Found) -> InPlace {
     };
     let fails =
         |check: &Check| check.check == CheckId::BeatsHeat && check.verdict == Verdict::Failed;
-    let (mut ids, mut axes) = (BTreeSet::<&String>::new(), BTreeSet::new());
+    let (mut ids, mut lost) = (BTreeSet::<&String>::new(), BTreeMap::new());
     for member in &found.members {
         let own = found.instance(member);
-        let (true, Target::Axis(axis)) = (member.checks.iter().any(fails), &own.target) else {
+        let failed = member.checks.iter().find(|check| fails(check));
+        let (Some(failed), Target::Axis(axis)) = (failed, &own.target) else {
             continue;
         };
         let part = stack.signature(&*own.effect(&member.estimate.values));
@@ -127,7 +131,7 @@ pub(crate) fn in_place(scope: &Scope<'_, '_>, found: &Found) -> InPlace {
         let most = gains.iter().map(|own| own.0).fold(0.0, f64::max);
         let near = gains.iter().filter(|own| own.0 >= NEAR_THE_BEST * most);
         ids.extend(near.map(|own| own.1));
-        axes.insert(axis.index());
+        lost.insert(axis.index(), failed.value.unwrap_or(0.0));
     }
     let of = |id: &String| Instance {
         kind,
@@ -136,11 +140,38 @@ pub(crate) fn in_place(scope: &Scope<'_, '_>, found: &Found) -> InPlace {
     };
     InPlace {
         instances: ids.into_iter().map(of).collect(),
-        axes,
+        lost,
     }
 }
 
 impl InPlace {
+    /// Whether an effect is a slow drift in whose place they are.
+    pub(crate) fn replaces(&self, instance: &Instance) -> bool {
+        let is_own = |axis: &Axis| self.lost.contains_key(&axis.index());
+        instance.kind.id == BY_CLOCK
+            && matches!(&instance.target, Target::Axis(axis) if is_own(axis))
+    }
+
+    /// Lists a drift that loses little with the shift that is named in its place.
+    pub(crate) fn list_drift(&self, found: &mut Found) {
+        let signatures = &found.signatures;
+        for member in &mut found.members {
+            let own = &signatures.forms[member.form];
+            let is_shift = signatures.instances[own.instance].kind.id == SHIFT;
+            if !is_shift || member.status() == Status::Surrogate {
+                continue;
+            }
+            let is_near = |axis: &Axis| {
+                let lost = self.lost.get(&axis.index());
+                own.amplitudes.contains(&axis.index())
+                    && lost.is_some_and(|lost| *lost > -MOST_LOST)
+            };
+            for axis in Axis::LINEAR.into_iter().filter(is_near) {
+                unresolved::list(member, BY_CLOCK, &axis.to_string(), 1.0);
+            }
+        }
+    }
+
     /// Leaves of the forms of these shifts those along one of the directions: another direction is another effect's.
     pub(crate) fn keep_own(&self, signatures: &mut Library) {
         if self.instances.is_empty() {
@@ -156,7 +187,7 @@ impl InPlace {
             .collect::<Vec<_>>()
         {
             let sizes = signatures.forms[form].amplitudes.clone();
-            for own in (0..sizes.len()).filter(|own| self.axes.contains(&sizes[*own])) {
+            for own in (0..sizes.len()).filter(|own| self.lost.contains_key(&sizes[*own])) {
                 signatures.add_part(form, &[own]);
             }
         }

@@ -170,10 +170,12 @@ pub fn find(scope: &Scope<'_, '_>, kinds: &[&'static Kind]) -> Found {
     let found = found_among(scope, instances.clone(), &thermometers, &none);
     let shifts = by_clock::in_place(scope, &found);
     if !shifts.instances.is_empty() {
-        let more = [&*instances, &*shifts.instances].concat();
-        let warmed = found_among(scope, more, &thermometers, &shifts);
+        let mut more = [&*instances, &*shifts.instances].concat();
+        more.retain(|own| !shifts.replaces(own));
+        let mut warmed = found_among(scope, more, &thermometers, &shifts);
         let is_shift = |member: &Member| warmed.instance(member).kind.id == by_thermometer::SHIFT;
         if warmed.named().any(is_shift) {
+            shifts.list_drift(&mut warmed);
             return warmed;
         }
     }
