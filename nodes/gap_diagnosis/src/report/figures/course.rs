@@ -115,23 +115,21 @@ impl fmt::Display for Course {
                 floor_um,
                 run,
                 worst_um,
-            } if effects.is_empty() => write!(
-                f,
-                "something came after the runs that were fitted: the held-out runs are off by {size_um:.2} µm rms, noise and \
-                 form give {floor_um:.2} µm; most in run {run}, {worst_um:.2} µm"
-            ),
-            Self::Remainder {
-                effects,
-                size_um,
-                floor_um,
-                run,
-                worst_um,
-            } => write!(
-                f,
-                "{}, and something that this does not explain: the held-out runs are still off by {size_um:.2} µm rms, \
-                 noise and form give {floor_um:.2} µm; most in run {run}, {worst_um:.2} µm",
-                effects.join(", ")
-            ),
+            } => {
+                let what = if effects.is_empty() {
+                    "something came after the runs that were fitted: the held-out runs are"
+                        .to_owned()
+                } else {
+                    let named = effects.join(", ");
+                    format!(
+                        "{named}, and something that this does not explain: the held-out runs are still"
+                    )
+                };
+                write!(
+                    f,
+                    "{what} off by {size_um:.2} µm rms, noise and form give {floor_um:.2} µm; most in run {run}, {worst_um:.2} µm"
+                )
+            }
         }
     }
 }

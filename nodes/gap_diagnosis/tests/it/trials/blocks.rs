@@ -1,5 +1,5 @@
-//! Two blocks that are touched every twenty minutes of a shift: what slips is told with its face and its run, what the machine does
-//! is named, and what warms is no noise.
+//! Two blocks that are touched every twenty minutes of a shift: what slips is reported with its face and its run, what the machine
+//! does is named, and what warms is no noise.
 
 use gap_diagnosis::report::{DoesNotRepeat, Status};
 use gap_diagnosis::{Diagnosis, GapConfig, diagnose};
