@@ -111,7 +111,7 @@ const CAUTION: f64 = 0.7;
 /// Coefficients of the field between runs that one difference tells about.
 const FIELD_MODES: usize = 6;
 /// Fewest rows of differences that say what noise is.
-const MIN_NOISE_ROWS: usize = 6;
+pub(crate) const MIN_NOISE_ROWS: usize = 6;
 /// Fewest rows that say what it is at a pace of its own.
 const FEWEST_OF_A_PACE: f64 = 60.0;
 

@@ -39,6 +39,7 @@ const MOST_WITHOUT_POWERS: usize = 4;
 /// Most powers of time that are left out of differences of touches.
 const MOST_POWERS_OF_TOUCHES: usize = 7;
 
+pub(crate) use touches::digit_mm;
 pub use touches::{Label, is_same_touch, label};
 
 /// Differences of one group of repeats.
@@ -225,8 +226,14 @@ fn runs_between(
     let joins = Joins::new(session, blocks, &places, residual, steps);
     let (rows, values) = match blocks[0].channel {
         Channel::Touch => {
-            let first = &session.runs[blocks[0].run];
-            touches::of_noise(first, blocks[0], &places[0], values)
+            let first = (&session.runs[blocks[0].run], blocks[0]);
+            let of_place = |row: usize| {
+                let of_block =
+                    |(block, rows): (&&Block, &Vec<usize>)| residual[block.start + rows[row]];
+                blocks.iter().zip(&places).map(of_block).collect()
+            };
+            let digit_mm = digit_mm((0..places[0].len()).map(of_place));
+            touches::of_noise(first, &places[0], values, digit_mm)
         }
         _ => (places[0].clone(), values),
     };

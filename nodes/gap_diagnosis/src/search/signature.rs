@@ -338,7 +338,9 @@ fn at_events(kind: &Kind, events_s: &[f64]) -> Vec<Vec<f64>> {
         return vec![];
     };
     let mut all = vec![];
-    for at_s in events_s {
+    // Later ones are beyond what the parameter may be.
+    let most_s = 60.0 * kind.parameters[instant].high;
+    for at_s in events_s.iter().filter(|at_s| **at_s <= most_s) {
         for mut values in shapes(kind) {
             values[instant] = at_s / 60.0;
             if !all.contains(&values) {

@@ -51,6 +51,8 @@ const MOST_IN_PAIRS: usize = 48;
 /// Steps must be this many times what repeats between them differ by, and what every simulator is off by.
 const LEAST_DEVIATIONS: f64 = 4.0;
 const LEAST_FORM_ERRORS: f64 = 2.0;
+/// Steps of touches must be more than this many of their last digit.
+const LEAST_DIGITS: f64 = 1.5;
 /// Most that steps leave of what as many powers of time leave.
 const MOST_BESIDE_POWERS: f64 = 0.5;
 
@@ -245,8 +247,18 @@ fn hold(all: &[Series], steps: &[usize], tried: f64) -> bool {
 /// One of the steps as it is reported; none where it is too small.
 fn change(all: &[Series], steps: &[usize], at: usize, config: &GapConfig) -> Option<Change> {
     let others: Vec<usize> = steps.iter().copied().filter(|s| *s != steps[at]).collect();
+    // Rounded touches flicker by one digit.
+    let digits_mm = all.iter().map(Series::digit_mm).filter(|mm| *mm > 0.0);
+    let digit_mm = digits_mm.fold(f64::INFINITY, f64::min);
+    let digit_mm = if digit_mm.is_finite() { digit_mm } else { 0.0 };
     let large = |own: &&Series| {
-        let least_mm = LEAST_FORM_ERRORS * 1e-3 * config.form_error_um;
+        let of_form_mm = LEAST_FORM_ERRORS * 1e-3 * config.form_error_um;
+        let of_digits_mm = if own.touch.is_some() {
+            LEAST_DIGITS * digit_mm
+        } else {
+            0.0
+        };
+        let least_mm = of_form_mm.max(of_digits_mm);
         own.size_mm(steps, at) > least_mm.max(LEAST_DEVIATIONS * own.deviation_mm(steps))
     };
     let tried = count(all.len() * steps.len());

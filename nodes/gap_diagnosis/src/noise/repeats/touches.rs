@@ -8,6 +8,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use twin::{Run, Session, Touch};
 
 use super::{Contrasts, POSE_RAD, weights};
+use crate::noise::MIN_NOISE_ROWS;
 use crate::search::rows::{Block, Row, count, time_s};
 
 /// Touches whose axes stood further apart, mm, are of two places; latency, drift and compensation move less.
@@ -31,6 +32,9 @@ fn most_of_middle(squares: usize) -> f64 {
         MOST_BESIDE * law.inverse_cdf(1.0 - CHANCE_OF_A_SURFACE) / law.inverse_cdf(0.5)
     })
 }
+
+/// Less than this is rounding of numbers, mm.
+const LEAST_DIGIT_MM: f64 = 1e-9;
 
 /// What touches that repeat each other have in common.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -88,13 +92,25 @@ fn touch_of<'r>(run: &'r Run, row: &Row) -> Option<&'r Touch> {
     row.touch.and_then(|touch| run.touches.get(touch))
 }
 
+/// The least that neighbouring values differ by at all: one digit, where they are rounded.
+pub(crate) fn digit_mm(series: impl Iterator<Item = Vec<f64>>) -> f64 {
+    let steps = series.flat_map(|own| {
+        let apart = own.windows(2).map(|two| (two[1] - two[0]).abs());
+        apart.filter(|mm| *mm > LEAST_DIGIT_MM).collect::<Vec<_>>()
+    });
+    let least = steps.fold(f64::INFINITY, f64::min);
+    if least.is_finite() { least } else { 0.0 }
+}
+
 /// Rows and differences of touches without those of surfaces that differ far more than most: something of its own happens there, as
 /// where a block creeps in its clamp.
+/// `digit_mm` is the least that readings of one place differ by, where they are rounded: surfaces whose last digit stands still are
+/// no measure of the others.
 pub(super) fn of_noise(
-    run: &Run,
-    block: &Block,
+    (run, block): (&Run, &Block),
     rows: &[usize],
     values: Vec<Vec<f64>>,
+    digit_mm: f64,
 ) -> (Vec<usize>, Vec<Vec<f64>>) {
     let surface = |row: &usize| {
         let label = touch_of(run, &block.rows[*row]).map(label);
@@ -113,7 +129,7 @@ pub(super) fn of_noise(
     if ranked.len() < FEWEST_SURFACES || values.len() < FEWEST_DIFFERENCES {
         return (rows.to_vec(), values);
     }
-    let middle = ranked[(ranked.len() - 1) / 2];
+    let middle = ranked[(ranked.len() - 1) / 2].max(digit_mm.powi(2) / 12.0);
     let is_noise =
         |places: &&Vec<usize>| mean(places) <= most_of_middle(places.len() * values.len()) * middle;
     let mut kept: Vec<usize> = surfaces
@@ -122,6 +138,9 @@ pub(super) fn of_noise(
         .flatten()
         .copied()
         .collect();
+    if kept.len() * values.len() < MIN_NOISE_ROWS {
+        return (rows.to_vec(), values);
+    }
     kept.sort_unstable();
     let of = |own: &Vec<f64>| kept.iter().map(|place| own[*place]).collect();
     let values = values.iter().map(of).collect();
@@ -261,14 +280,35 @@ mod tests {
             .iter()
             .map(|own| vec![*own, -0.8, 11.0 * own, 0.7, 1.1, -own])
             .collect();
-        let (kept, left) = of_noise(&session.runs[0], block, &all, values.clone());
+        let (kept, left) = of_noise((&session.runs[0], block), &all, values.clone(), 0.0);
         assert_eq!(kept, [0, 1, 3, 4, 5]);
         assert!(left.iter().flatten().all(|own| own.abs() < 1.3), "{left:?}");
         let alike: Vec<Vec<f64>> = values
             .iter()
             .map(|own| own.iter().map(|v| v.signum()).collect())
             .collect();
-        let (kept, left) = of_noise(&session.runs[0], block, &all, alike.clone());
+        let (kept, left) = of_noise((&session.runs[0], block), &all, alike.clone(), 0.0);
         assert_eq!((kept, left), (all, alike));
+    }
+
+    #[test]
+    fn surfaces_whose_last_digit_stands_still_are_no_measure_of_the_others() {
+        let of = rig::circles(&rig::machine(), &[50.0], 1).runs.remove(0);
+        let mut session = rig::circles(&rig::machine(), &[50.0], 1);
+        session.runs = vec![cycle(&of, &[], 2.0)];
+        let rows = Rows::new(&session, &[0], 60, |_| true);
+        let block = &rows.blocks[0];
+        let all: Vec<usize> = (0..FACES.len()).collect();
+        // Two micrometres a digit: one surface lies between two digits, the others do not.
+        let values: Vec<Vec<f64>> = [1.0, -1.0, 1.0, 1.0]
+            .iter()
+            .map(|own| vec![1e-3 * own, 0.0, 0.0, 0.0, 0.0, 0.0])
+            .collect();
+        let of_digit =
+            |digit_mm: f64| of_noise((&session.runs[0], block), &all, values.clone(), digit_mm).0;
+        assert_eq!(of_digit(2e-3), all);
+        assert_eq!(of_digit(0.0), all[1..]);
+        let rounded = [vec![0.0, 2e-3, 0.0, 4e-3], vec![2e-3; 4]];
+        assert!((digit_mm(rounded.into_iter()) - 2e-3).abs() < 1e-12);
     }
 }

@@ -230,6 +230,16 @@ impl Series {
         )
     }
 
+    /// The last digit of touches that are rounded, mm; zero of others.
+    pub fn digit_mm(&self) -> f64 {
+        let values = self.points.iter().map(|point| point.value_mm).collect();
+        let of_touches = self
+            .touch
+            .as_ref()
+            .map(|_| repeats::digit_mm([values].into_iter()));
+        of_touches.unwrap_or(0.0)
+    }
+
     /// Standard deviation of what steps leave, mm.
     pub fn deviation_mm(&self, steps: &[usize]) -> f64 {
         let (left, free) = self.left(self.stepped(steps));

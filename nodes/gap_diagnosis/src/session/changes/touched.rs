@@ -152,6 +152,9 @@ pub(super) fn is_of_one_that_moved(
             .as_ref()
             .map_or(0.0, |touch| touch.approach[axis])
     };
+    if sizes.is_empty() {
+        return false;
+    }
     let sizes = DVector::from_vec(sizes);
     let approaches = DMatrix::from_fn(sizes.len(), 3, approach);
     let svd = approaches.clone().svd(true, true);
