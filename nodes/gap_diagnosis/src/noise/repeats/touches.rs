@@ -268,14 +268,18 @@ mod tests {
         assert_eq!(super::super::groups(&session, &rows).len(), 2);
     }
 
+    /// A session of one cycle, its rows, and the places of all its faces.
+    fn one_cycle() -> (Session, Rows, Vec<usize>) {
+        let mut session = rig::circles(&rig::machine(), &[50.0], 1);
+        session.runs = vec![cycle(&session.runs[0], &[], 2.0)];
+        let rows = Rows::new(&session, &[0], 60, |_| true);
+        (session, rows, (0..FACES.len()).collect())
+    }
+
     #[test]
     fn a_surface_that_differs_far_more_than_the_others_is_not_in_the_noise() {
-        let of = rig::circles(&rig::machine(), &[50.0], 1).runs.remove(0);
-        let mut session = rig::circles(&rig::machine(), &[50.0], 1);
-        session.runs = vec![cycle(&of, &[], 2.0)];
-        let rows = Rows::new(&session, &[0], 60, |_| true);
+        let (session, rows, all) = one_cycle();
         let block = &rows.blocks[0];
-        let all: Vec<usize> = (0..FACES.len()).collect();
         let values: Vec<Vec<f64>> = [1.0, -1.1, 0.9, 1.2]
             .iter()
             .map(|own| vec![*own, -0.8, 11.0 * own, 0.7, 1.1, -own])
@@ -293,12 +297,8 @@ mod tests {
 
     #[test]
     fn surfaces_whose_last_digit_stands_still_are_no_measure_of_the_others() {
-        let of = rig::circles(&rig::machine(), &[50.0], 1).runs.remove(0);
-        let mut session = rig::circles(&rig::machine(), &[50.0], 1);
-        session.runs = vec![cycle(&of, &[], 2.0)];
-        let rows = Rows::new(&session, &[0], 60, |_| true);
+        let (session, rows, all) = one_cycle();
         let block = &rows.blocks[0];
-        let all: Vec<usize> = (0..FACES.len()).collect();
         // Two micrometres a digit: one surface lies between two digits, the others do not.
         let values: Vec<Vec<f64>> = [1.0, -1.0, 1.0, 1.0]
             .iter()
