@@ -207,7 +207,8 @@ fn found_among(
     let is_closed = !best.leftover.flagged();
     if !best.set.is_empty() && scope.config.applies(Rule::FreeShapes) {
         let sizes: Vec<f64> = best.refit.estimates.iter().map(|e| e.d).collect();
-        widening::widen(stack, &mut signatures, &best.set, &sizes, &best.visited);
+        let set = (&best.set, &sizes[..]);
+        widening::widen(stack, &mut signatures, set, &best.visited, is_closed);
         normal = signatures.normal(&stack.z);
         let wide = search(scope, &signatures, &normal);
         let is_better = if is_closed {

@@ -23,7 +23,7 @@
 use std::f64::consts::TAU;
 
 use metrology::Axis;
-use nalgebra::Matrix2;
+use nalgebra::{DVector, Matrix2};
 use twin::Channel;
 use twin::effects::{Role, Target};
 
@@ -46,6 +46,10 @@ const FEWEST_TARGETS: usize = 5;
 const MIN_LIKENESS_ALIASED: f64 = 0.75;
 /// Most places that (1) is taken over, and most other frequencies.
 const MAX_COMPARED: usize = 400;
+/// A run shows signatures from this share of their squares on.
+const MIN_SHARE_SEEN: f64 = 1e-4;
+/// An axis moved in a run where it went further.
+const MOVED_MM: f64 = 1.0;
 /// Name of the parameter that is a period by itself, of an encoder's signal.
 const PERIOD_UM: &str = "period_um";
 
@@ -103,6 +107,33 @@ pub fn is_along_axes(stack: &Stack<'_>) -> bool {
 pub fn extent_mm(stack: &Stack<'_>, axis: Axis) -> Option<[f64; 2]> {
     let places = places_mm(stack, axis);
     Some([*places.first()?, *places.last()?])
+}
+
+/// The same over the runs in which it moved while an instrument followed that shows some signatures; none where that is at targets.
+pub fn seen_mm(stack: &Stack<'_>, axis: Axis, shown: &[&DVector<f64>]) -> Option<[f64; 2]> {
+    if is_at_targets(stack, axis) {
+        return None;
+    }
+    let squares = |from: usize, len: usize| -> f64 {
+        shown
+            .iter()
+            .map(|column| column.rows(from, len).norm_squared())
+            .sum()
+    };
+    let least = MIN_SHARE_SEEN * squares(0, stack.rows.len);
+    let is_followed = |block: &&Block| {
+        !matches!(block.channel, Channel::Touch | Channel::Thermometer(_))
+            && squares(block.start, block.rows.len()) > least
+    };
+    let ends_of = |block: &Block| {
+        let run = &stack.session.runs[block.run];
+        let places = block.rows.iter().map(|row| position(run, row, axis));
+        let ends = |ends: [f64; 2], at: f64| [ends[0].min(at), ends[1].max(at)];
+        places.fold([f64::INFINITY, f64::NEG_INFINITY], ends)
+    };
+    let followed = stack.rows.blocks.iter().filter(is_followed).map(ends_of);
+    let moved = followed.filter(|[low, high]| high - low > MOVED_MM);
+    moved.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
 }
 
 /// Rows of each target along an axis, by its place: readings nearer than a share of a lead are of one target.

@@ -16,6 +16,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use metrology::Axis;
+use nalgebra::{DMatrix, DVector};
 use twin::effects::Target;
 
 use crate::noise::normal::Normal;
@@ -35,16 +36,21 @@ const MOST_OF_CURVE: usize = 17;
 /// Sets whose C is worse by this share of what the best one explains stand nearly as well.
 const NEAR_SHARE: f64 = 0.1;
 
-/// Adds the wide forms; `sizes` are the members' D.
+/// Effects that are any curve of a guide. Where a search leaves something open, their wide forms are tried by themselves: of a
+/// guide that is dented where it was measured the two lowest orders are a small part, and are never near the best set.
+const GUIDES: [&str; 2] = ["straightness", "angular_error"];
+
+/// Adds the wide forms; `sizes` are the members' D, and `is_closed` whether they leave nothing.
 pub fn widen(
     stack: &Stack<'_>,
     signatures: &mut Library,
-    set: &Set,
-    sizes: &[f64],
+    (set, sizes): (&Set, &[f64]),
     visited: &BTreeMap<Set, f64>,
+    is_closed: bool,
 ) {
     let least = visited[set];
-    let reach = NEAR_SHARE * (stack.z.norm_squared() - least).max(0.0);
+    let explained = (stack.z.norm_squared() - least).max(0.0);
+    let reach = NEAR_SHARE * explained;
     let near = visited.iter().filter(|(_, score)| **score <= least + reach);
     let forms: BTreeSet<usize> = near.flat_map(|(set, _)| set.iter().copied()).collect();
     let mut added = BTreeMap::new();
@@ -58,8 +64,16 @@ pub fn widen(
             added.insert(instance, wide);
         }
     }
+    let curves = if is_closed {
+        vec![]
+    } else {
+        open_curves(stack, signatures, explained)
+    };
     let normal = signatures.normal(&stack.z);
     let log_rows = stack.freedom().ln();
+    for wide in curves {
+        add_parts(signatures, &normal, &[], wide, (log_rows, MOST_PARTS));
+    }
     for (instance, wide) in added {
         let Some(wide) = wide else { continue };
         let of = |form: &usize| signatures.forms[*form].instance;
@@ -80,6 +94,53 @@ pub fn widen(
     }
 }
 
+/// An open curve is tried where it alone explains this share of what the best set explains.
+const MIN_SHARE_ALONE: f64 = 0.5;
+
+/// Adds the wide forms of the guides' curves that were read on paths, each over the part of the travel where it was seen, and
+/// explains most of the `explained` squares alone.
+fn open_curves(stack: &Stack<'_>, signatures: &mut Library, explained: f64) -> Vec<usize> {
+    let mut open = BTreeMap::new();
+    for form in &signatures.forms {
+        let own = &signatures.instances[form.instance];
+        let Target::Component(component) = own.target else {
+            continue;
+        };
+        if !GUIDES.contains(&own.kind.id) || own.begins.is_some() {
+            continue;
+        }
+        let shown: Vec<&DVector<f64>> = form
+            .columns
+            .iter()
+            .map(|k| &signatures.columns[*k])
+            .collect();
+        if let Some(part_mm) = resolved::seen_mm(stack, component.of, &shown) {
+            let mut values = form.values.clone();
+            put_ends(own, part_mm, &mut values);
+            open.insert(form.instance, values);
+        }
+    }
+    let mut kept = vec![];
+    for (instance, values) in open {
+        let Some(wide) = signatures.add(stack, instance, values, true) else {
+            continue;
+        };
+        let columns = signatures.forms[wide].columns.iter();
+        let columns: Vec<DVector<f64>> = columns.map(|k| signatures.columns[*k].clone()).collect();
+        let all: Vec<usize> = (0..columns.len()).collect();
+        let alone = Normal::new(&DMatrix::from_columns(&columns), &stack.z).solve(&all);
+        if alone.gain >= MIN_SHARE_ALONE * explained {
+            kept.push(wide);
+        } else {
+            signatures.forms.pop();
+        }
+    }
+    kept
+}
+
+/// Amplitudes that a curve of a guide over a part of its travel has beside its own, so that each has the orders 1 to 3: a guide that
+/// turns and one that is not straight cost the same, and neither is named where both read alike.
+const FIRST_ORDERS: [&str; 2] = ["free_p1_um", "free_p3_urad"];
 /// Names of the ends of the part of a travel that a curve is over.
 const ENDS: [&str; 2] = ["free_from_mm", "free_to_mm"];
 
@@ -89,18 +150,22 @@ fn through_targets(stack: &Stack<'_>, instance: &Instance, mut values: Vec<f64>)
     let Some(axis) = axis_at_targets(stack, instance) else {
         return values;
     };
-    let Some([low_mm, high_mm]) = resolved::extent_mm(stack, axis) else {
-        return values;
-    };
+    if let Some(part_mm) = resolved::extent_mm(stack, axis) {
+        put_ends(instance, part_mm, &mut values);
+    }
+    values
+}
+
+/// Lets a curve be over a part of its axis' travel, mm.
+fn put_ends(instance: &Instance, [low_mm, high_mm]: [f64; 2], values: &mut [f64]) {
     let own = instance.kind.parameters.iter().chain(instance.kind.free);
-    for (parameter, value) in own.zip(&mut values) {
+    for (parameter, value) in own.zip(values) {
         match ENDS.iter().position(|end| *end == parameter.name) {
             Some(0) => *value = low_mm,
             Some(_) => *value = high_mm,
             None => {}
         }
     }
-    values
 }
 
 /// The axis that an instance acts on, where it was read at targets only.
@@ -196,8 +261,17 @@ fn add_parts(
         .flat_map(|other| signatures.forms[*other].columns.clone())
         .collect();
     let all = 0..form.amplitudes.len();
+    let kind = signatures.instances[form.instance].kind;
+    let names = || kind.parameters.iter().chain(kind.free).map(|p| p.name);
+    let is_part = names()
+        .zip(&form.values)
+        .any(|(name, value)| name == ENDS[0] && *value != 0.0);
+    let is_first = |place: usize| {
+        let name = names().nth(place);
+        place < own || (is_part && name.is_some_and(|name| FIRST_ORDERS.contains(&name)))
+    };
     let (mut taken, mut open): (Vec<usize>, Vec<usize>) =
-        all.partition(|k| form.amplitudes[*k] < own);
+        all.partition(|k| is_first(form.amplitudes[*k]));
     if taken.is_empty() {
         return;
     }

@@ -115,6 +115,18 @@ pub(super) const TO_MM: Parameter = Parameter::shape("free_to_mm", PART_MM, 100.
 /// Where a part of a travel can lie, mm.
 const PART_MM: [f64; 2] = [-100_000.0, 100_000.0];
 
+/// Heights of a curve, then the ends of the part of the travel that it is over.
+pub(super) const fn with_part<const N: usize>(heights: &[Parameter]) -> [Parameter; N] {
+    let mut all = [TO_MM; N];
+    let mut place = 0;
+    while place < heights.len() {
+        all[place] = heights[place];
+        place += 1;
+    }
+    all[heights.len()] = FROM_MM;
+    all
+}
+
 /// Sum of Legendre polynomials of the orders `first`, `first + 1`, ... at x.
 pub(super) fn legendre(first: usize, amplitudes: &[f64], x: f64) -> f64 {
     let (mut before, mut here) = (1.0, x);
@@ -178,6 +190,16 @@ impl Travel {
     /// Share of the half travel, (2).
     pub(super) fn share(self, position: f64) -> f64 {
         (position - self.middle) * self.per_half
+    }
+
+    /// The same of a curve that beyond a part of the travel stays as it is at its end.
+    pub(super) fn share_within(self, position: f64, [from, to]: [f64; 2]) -> f64 {
+        let share = self.share(position);
+        if from < to {
+            share.clamp(-1.0, 1.0)
+        } else {
+            share
+        }
     }
 }
 

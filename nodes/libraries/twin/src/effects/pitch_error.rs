@@ -33,7 +33,7 @@
 use metrology::Axis;
 
 use super::form::{
-    CURVE_UM, FROM_MM, PLACE_SPLINES, TO_MM, Travel, legendre, place_splines, slope_of_splines,
+    CURVE_UM, PLACE_SPLINES, Travel, legendre, place_splines, slope_of_splines, with_part,
 };
 use super::{Effect, Kind, Moment, Parameter, Scene, Target, Targets};
 use crate::Response;
@@ -55,16 +55,7 @@ pub static KIND: Kind = Kind {
 };
 
 /// The heights of the curve, then the ends of the part of the travel that it is over.
-const CURVE: [Parameter; CURVE_UM.len() + 2] = {
-    let mut all = [TO_MM; CURVE_UM.len() + 2];
-    let mut place = 0;
-    while place < CURVE_UM.len() {
-        all[place] = CURVE_UM[place];
-        place += 1;
-    }
-    all[CURVE_UM.len()] = FROM_MM;
-    all
-};
+const CURVE: [Parameter; CURVE_UM.len() + 2] = with_part(CURVE_UM);
 
 /// Place of the lower end of the part among the values.
 const FROM: usize = 2 + CURVE_UM.len();
