@@ -6,6 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::judgement::confidence::ODDS;
 use crate::search::selection::{Set, with};
 use crate::search::signature::Library;
 
@@ -52,8 +53,8 @@ const LINES_OF_CURVES: [(&str, &[&str]); 2] = [
     ("straightness", &["squareness"]),
 ];
 
-/// The set with each curve replaced by a line that does as well in its place: the search may never have come by the line, for a curve
-/// with more amplitudes is better by more than the first of them.
+/// The set with each curve replaced by a line in whose place it would not be named: the search may never have come by the line, for a
+/// curve with more amplitudes is better by more than the first of them. The curve is then listed with the line.
 pub fn straightened(signatures: &Library, best: Set, mut score: impl FnMut(&Set) -> f64) -> Set {
     let id = |form: usize| {
         signatures.instances[signatures.forms[form].instance]
@@ -83,7 +84,7 @@ pub fn straightened(signatures: &Library, best: Set, mut score: impl FnMut(&Set)
             .map(|set| (score(&set), set));
         let first = straight.min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((line, set)) = first
-            && line <= score(&now) + TIE
+            && line <= score(&now) + 2.0 * ODDS.ln()
         {
             now = set;
         }
@@ -167,12 +168,12 @@ mod tests {
     }
 
     #[test]
-    fn a_curve_gives_way_to_a_line_that_does_as_well_and_to_none_that_is_worse() {
+    fn a_curve_gives_way_to_a_line_that_is_not_decided_against_and_to_none_that_is_worse() {
         let mut library = library();
         library.instances[0].kind = effects::kind("pitch_error").unwrap();
         let scores = |line: f64| move |set: &Set| if set.contains(&2) { line } else { 10.0 };
-        assert_eq!(straightened(&library, vec![0, 1], scores(11.5)), [1, 2]);
-        assert_eq!(straightened(&library, vec![0, 1], scores(12.5)), [0, 1]);
+        assert_eq!(straightened(&library, vec![0, 1], scores(15.9)), [1, 2]);
+        assert_eq!(straightened(&library, vec![0, 1], scores(16.1)), [0, 1]);
         // A scale error that is in the set already leaves the curve as it is.
         assert_eq!(straightened(&library, vec![0, 2], scores(0.0)), [0, 2]);
     }

@@ -97,8 +97,8 @@ pub fn widen(
 /// An open curve is tried where it alone explains this share of what the best set explains.
 const MIN_SHARE_ALONE: f64 = 0.5;
 
-/// Adds the wide forms of the guides' curves that were read on paths, each over the part of the travel where it was seen, and
-/// explains most of the `explained` squares alone.
+/// Adds the wide forms of the guides' curves that were read on paths, each over the part of the travel where it was seen, which
+/// explain most of the `explained` squares alone. Turns are rolls alone: others show along their own axis, too, as a screw does.
 fn open_curves(stack: &Stack<'_>, signatures: &mut Library, explained: f64) -> Vec<usize> {
     let mut open = BTreeMap::new();
     for form in &signatures.forms {
@@ -106,7 +106,10 @@ fn open_curves(stack: &Stack<'_>, signatures: &mut Library, explained: f64) -> V
         let Target::Component(component) = own.target else {
             continue;
         };
-        if !GUIDES.contains(&own.kind.id) || own.begins.is_some() {
+        let rolls = [(Axis::A, Axis::X), (Axis::B, Axis::Y), (Axis::C, Axis::Z)];
+        let is_turn = component.is_angular();
+        let is_across = !is_turn || rolls.contains(&(component.direction, component.of));
+        if !GUIDES.contains(&own.kind.id) || own.begins.is_some() || !is_across {
             continue;
         }
         let shown: Vec<&DVector<f64>> = form
