@@ -10,15 +10,16 @@ use std::time::{Duration, Instant};
 use abbe_msgs::msg::{AxisState, PlanStatus};
 use abbe_msgs::topics;
 use abbe_tests::graph::{Graph, Voice, now, port};
+use abbe_tests::namespace::isolated;
 use abbe_tests::program::{Process, command, domain};
 use abbe_tests::said::compensation;
 use abbe_tests::scenario::Scenario;
+use linuxcnc_bridge::BridgeConfig;
 use linuxcnc_bridge::io::start::Controller;
-use linuxcnc_bridge::{BridgeConfig, BridgeError};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 
-use crate::{ONE_AT_A_TIME, installed, root};
+use crate::{installed, root};
 
 /// What is asked for on X, mm.
 pub const OFFSET_MM: f64 = 0.030;
@@ -45,17 +46,7 @@ pub fn controller() -> Controller {
     let parameters = file["/**"]["ros__parameters"].clone();
     let config: BridgeConfig = serde_json::from_value(parameters).unwrap();
     let ini = folder.join("controller/latency.ini");
-    let deadline = Instant::now() + Duration::from_secs(600);
-    loop {
-        match Controller::start(&config, &ini) {
-            Ok(controller) => return controller,
-            Err(
-                error @ (BridgeError::StartedElsewhere { .. } | BridgeError::AlreadyRunning { .. }),
-            ) => assert!(Instant::now() < deadline, "{error}"),
-            Err(error) => panic!("{error}"),
-        }
-        std::thread::sleep(Duration::from_secs(1));
-    }
+    Controller::start(&config, &ini).unwrap_or_else(|error| panic!("{error}"))
 }
 
 pub struct Desk {
@@ -180,118 +171,111 @@ fn fades(controller: &Controller, killed: Instant) {
 
 #[test]
 fn a_bridge_killed_in_mid_program_leaves_an_offset_that_hal_fades_and_the_next_one_goes_on() {
-    if !installed() {
-        return;
-    }
-    let _turn = ONE_AT_A_TIME
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
-    let controller = controller();
-    let mut desk = Desk::new(18);
-    let began = Instant::now();
-    let bridge = desk.node("linuxcnc_bridge");
-    let settled = |state: &AxisState| stands(state) && offset_mm(state) > OFFSET_MM - NONE_MM;
-    desk.with_offset(began, settled);
-    let sequencer = desk.running(PROGRAM);
-    let begun = Instant::now();
-    desk.with_offset(begun, |state| state.commanded[0] > 5e-3 && !stands(state));
-    bridge.signal(Signal::SIGKILL);
-    let killed = Instant::now();
-    fades(&controller, killed);
-    drop(bridge);
-    sequencer.signal(Signal::SIGINT);
-    let ended = sequencer.ended_within(Duration::from_secs(30));
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+    isolated(|| {
+        if !installed() {
+            return;
+        }
+        let controller = controller();
+        let mut desk = Desk::new(18);
+        let began = Instant::now();
+        let bridge = desk.node("linuxcnc_bridge");
+        let settled = |state: &AxisState| stands(state) && offset_mm(state) > OFFSET_MM - NONE_MM;
+        desk.with_offset(began, settled);
+        let sequencer = desk.running(PROGRAM);
+        let begun = Instant::now();
+        desk.with_offset(begun, |state| state.commanded[0] > 5e-3 && !stands(state));
+        bridge.signal(Signal::SIGKILL);
+        let killed = Instant::now();
+        fades(&controller, killed);
+        drop(bridge);
+        sequencer.signal(Signal::SIGINT);
+        let ended = sequencer.ended_within(Duration::from_secs(30));
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
 
-    let again = Instant::now();
-    let bridge = desk.node("linuxcnc_bridge");
-    desk.graph.wait_longer(START, "positions", |graph| {
-        graph.since(&topics::AXES_STATE, again).pop()
-    });
-    // Nobody watches the program: another one is not begun beside it.
-    let refused = Instant::now();
-    let sequencer = desk.running(SHORT);
-    let status = desk.ended(refused);
-    let words = "the controller is running something else";
-    assert!(status.message.contains(words), "{status:?}");
-    drop(sequencer);
-    desk.graph
-        .wait_longer(START, "the program's own end", |graph| {
-            let states = graph.since(&topics::AXES_STATE, refused);
-            let last = states.iter().rev().take(1_000);
-            let at_rest =
-                last.filter(|(_, state)| stands(state) && state.commanded[0].abs() < 1e-6);
-            (at_rest.count() == 1_000).then_some(())
+        let again = Instant::now();
+        let bridge = desk.node("linuxcnc_bridge");
+        desk.graph.wait_longer(START, "positions", |graph| {
+            graph.since(&topics::AXES_STATE, again).pop()
         });
-    let done = Instant::now();
-    let sequencer = desk.running(SHORT);
-    let status = desk.ended(done);
-    assert_eq!(status.state, PlanStatus::STATE_DONE, "{status:?}");
-    // Its drives have come to rest, and nobody asks for an offset.
-    let at_rest = desk.graph.next(&topics::AXES_STATE, Instant::now(), stands);
-    assert!(offset_mm(&at_rest).abs() < NONE_MM, "{at_rest:?}");
-    desk.with_offset(Instant::now(), settled);
-    sequencer.stop();
-    bridge.signal(Signal::SIGINT);
-    let ended = bridge.ended_within(Duration::from_secs(60));
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
-    desk.voice.stop();
+        // Nobody watches the program: another one is not begun beside it.
+        let refused = Instant::now();
+        let sequencer = desk.running(SHORT);
+        let status = desk.ended(refused);
+        let words = "the controller is running something else";
+        assert!(status.message.contains(words), "{status:?}");
+        drop(sequencer);
+        desk.graph
+            .wait_longer(START, "the program's own end", |graph| {
+                let states = graph.since(&topics::AXES_STATE, refused);
+                let last = states.iter().rev().take(1_000);
+                let at_rest =
+                    last.filter(|(_, state)| stands(state) && state.commanded[0].abs() < 1e-6);
+                (at_rest.count() == 1_000).then_some(())
+            });
+        let done = Instant::now();
+        let sequencer = desk.running(SHORT);
+        let status = desk.ended(done);
+        assert_eq!(status.state, PlanStatus::STATE_DONE, "{status:?}");
+        // Its drives have come to rest, and nobody asks for an offset.
+        let at_rest = desk.graph.next(&topics::AXES_STATE, Instant::now(), stands);
+        assert!(offset_mm(&at_rest).abs() < NONE_MM, "{at_rest:?}");
+        desk.with_offset(Instant::now(), settled);
+        sequencer.stop();
+        bridge.signal(Signal::SIGINT);
+        let ended = bridge.ended_within(Duration::from_secs(60));
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+        desk.voice.stop();
+    });
 }
 
-/// A bridge that starts LinuxCNC itself; once more while somebody else's test has one.
+/// A bridge that starts LinuxCNC itself, as soon as there are positions.
 fn starting(domain: u16, graph: &Graph) -> Process {
     let file = root().join("launch_configs/linuxcnc_latency/linuxcnc_bridge.yaml");
-    let deadline = Instant::now() + Duration::from_secs(600);
-    loop {
-        let mut starts = command(domain, &["node", "linuxcnc_bridge", "--ros-args"]);
-        starts.arg("--params-file").arg(&file);
-        let since = Instant::now();
-        let mut process = Process::start(starts);
-        while process.is_running() {
-            if !graph.since(&topics::AXES_STATE, since).is_empty() {
-                return process;
-            }
-            assert!(since.elapsed() < START, "no positions");
-            std::thread::sleep(Duration::from_millis(50));
+    let mut starts = command(domain, &["node", "linuxcnc_bridge", "--ros-args"]);
+    starts.arg("--params-file").arg(&file);
+    let since = Instant::now();
+    let mut process = Process::start(starts);
+    while process.is_running() {
+        if !graph.since(&topics::AXES_STATE, since).is_empty() {
+            return process;
         }
-        let ended = process.ended_within(Duration::from_secs(1));
-        let is_anothers = ended.said.contains("only one can");
-        assert!(is_anothers && Instant::now() < deadline, "{}", ended.said);
-        std::thread::sleep(Duration::from_secs(1));
+        assert!(since.elapsed() < START, "no positions");
+        std::thread::sleep(Duration::from_millis(50));
     }
+    let ended = process.ended_within(Duration::from_secs(1));
+    panic!("{}", ended.said);
 }
 
 #[test]
 fn after_a_bridge_that_was_killed_with_its_linuxcnc_the_next_one_starts_at_once() {
-    if !installed() {
-        return;
-    }
-    let _turn = ONE_AT_A_TIME
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
-    let domain = domain(19);
-    let graph = Graph::join(domain);
-    let bridge = starting(domain, &graph);
-    bridge.signal(Signal::SIGKILL);
-    let killed = Instant::now();
-    drop(bridge);
-    // Its LinuxCNC is still there, and about to end.
-    let file = root().join("launch_configs/linuxcnc_latency/linuxcnc_bridge.yaml");
-    let mut starts = command(domain, &["node", "linuxcnc_bridge", "--ros-args"]);
-    starts.arg("--params-file").arg(&file);
-    let mut next = Process::start(starts);
-    graph.wait_longer(START, "positions of the next one", |graph| {
-        if !next.is_running() {
-            return Some(false);
+    isolated(|| {
+        if !installed() {
+            return;
         }
-        // What the first one said last may be on its way.
-        let states = graph.since(&topics::AXES_STATE, killed + Duration::from_secs(3));
-        (!states.is_empty()).then_some(true)
+        let domain = domain(19);
+        let graph = Graph::join(domain);
+        let bridge = starting(domain, &graph);
+        bridge.signal(Signal::SIGKILL);
+        let killed = Instant::now();
+        drop(bridge);
+        // Its LinuxCNC is still there, and about to end.
+        let file = root().join("launch_configs/linuxcnc_latency/linuxcnc_bridge.yaml");
+        let mut starts = command(domain, &["node", "linuxcnc_bridge", "--ros-args"]);
+        starts.arg("--params-file").arg(&file);
+        let mut next = Process::start(starts);
+        graph.wait_longer(START, "positions of the next one", |graph| {
+            if !next.is_running() {
+                return Some(false);
+            }
+            // What the first one said last may be on its way.
+            let states = graph.since(&topics::AXES_STATE, killed + Duration::from_secs(3));
+            (!states.is_empty()).then_some(true)
+        });
+        next.signal(Signal::SIGINT);
+        let ended = next.ended_within(Duration::from_secs(60));
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+        assert!(nothing_runs(), "LinuxCNC is left behind");
     });
-    next.signal(Signal::SIGINT);
-    let ended = next.ended_within(Duration::from_secs(60));
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
-    assert!(nothing_runs(), "LinuxCNC is left behind");
 }
 
 fn nothing_runs() -> bool {
@@ -309,31 +293,26 @@ fn has_guard() -> bool {
 
 #[test]
 fn a_linuxcnc_that_was_only_starting_when_its_bridge_was_killed_ends_too() {
-    if !installed() {
-        return;
-    }
-    let _turn = ONE_AT_A_TIME
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
-    let deadline = Instant::now() + Duration::from_secs(600);
-    // Not beside somebody else's.
-    while has_guard() {
-        assert!(Instant::now() < deadline, "another one runs");
-        std::thread::sleep(Duration::from_secs(1));
-    }
-    let file = root().join("launch_configs/linuxcnc_latency/linuxcnc_bridge.yaml");
-    let mut starts = command(domain(19), &["node", "linuxcnc_bridge", "--ros-args"]);
-    starts.arg("--params-file").arg(&file);
-    let mut bridge = Process::start(starts);
-    while !has_guard() {
-        assert!(bridge.is_running() && Instant::now() < deadline, "no guard");
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    bridge.signal(Signal::SIGKILL);
-    drop(bridge);
-    let until = Instant::now() + START;
-    while has_guard() || !nothing_runs() {
-        assert!(Instant::now() < until, "LinuxCNC is left behind");
-        std::thread::sleep(Duration::from_millis(200));
-    }
+    isolated(|| {
+        if !installed() {
+            return;
+        }
+        assert!(!has_guard(), "somebody else's LinuxCNC runs");
+        let deadline = Instant::now() + START;
+        let file = root().join("launch_configs/linuxcnc_latency/linuxcnc_bridge.yaml");
+        let mut starts = command(domain(19), &["node", "linuxcnc_bridge", "--ros-args"]);
+        starts.arg("--params-file").arg(&file);
+        let mut bridge = Process::start(starts);
+        while !has_guard() {
+            assert!(bridge.is_running() && Instant::now() < deadline, "no guard");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        bridge.signal(Signal::SIGKILL);
+        drop(bridge);
+        let until = Instant::now() + START;
+        while has_guard() || !nothing_runs() {
+            assert!(Instant::now() < until, "LinuxCNC is left behind");
+            std::thread::sleep(Duration::from_millis(200));
+        }
+    });
 }

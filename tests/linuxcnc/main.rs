@@ -1,7 +1,7 @@
 //! The LinuxCNC scenarios as a person runs them, judged by their bags.
 //!
 //! The only truth is the delay in the scenario's HAL file, which nothing but LinuxCNC and this test
-//! reads. Only one LinuxCNC runs on a computer: the tests wait for each other. Where LinuxCNC is not
+//! reads. Only one LinuxCNC runs on a computer: each test has namespaces of its own. Where LinuxCNC is not
 //! installed nothing can be tested: that is a failure where `CI=true`, and is said elsewhere.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
@@ -14,11 +14,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use abbe_msgs::topics::{self, Topic};
 use abbe_msgs::{Message, Wire, from_cdr};
 use abbe_tests::foreseen::Foreseen;
+use abbe_tests::namespace::isolated;
 use linuxcnc_bridge::fault::QUEUE_FAULT;
 use metrology::Axis;
 use metrology::sample::{ProbedPoint, Rejection, TestKind, TestSegment};
@@ -28,8 +28,6 @@ use serde_json::Value;
 mod killed;
 mod simulated;
 mod strangers;
-
-static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 /// Free of everybody else's traffic.
 const DOMAIN: &str = "87";
@@ -62,7 +60,6 @@ struct Finished {
     report: Value,
     gap: Option<Value>,
     _folder: tempfile::TempDir,
-    _turn: MutexGuard<'static, ()>,
 }
 
 /// LinuxCNC's interpreter sometimes finds its own queue not empty after a touch when the computer is
@@ -97,7 +94,6 @@ fn run(scenario: &str) -> Option<Finished> {
     if !installed() {
         return None;
     }
-    let turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let program = abbe_tests::program::abbe();
     let folder = tempfile::tempdir().unwrap();
     let said = (1..=ATTEMPTS)
@@ -122,7 +118,6 @@ fn run(scenario: &str) -> Option<Finished> {
         report: serde_json::from_str(&report).unwrap(),
         gap: gap.map(|text| serde_json::from_str(&text).unwrap()),
         _folder: folder,
-        _turn: turn,
     })
 }
 
@@ -248,171 +243,179 @@ fn by_feed(touches: &[ProbedPoint]) -> Vec<(f64, f64, usize)> {
 
 #[test]
 fn val_linuxcnc_the_latency_is_the_delay_that_only_hal_holds_and_corrected_points_agree() {
-    let Some(finished) = run("linuxcnc_latency") else {
-        return;
-    };
-    let latencies = read(&finished.bag, &topics::LATENCY);
-    let delay_s = in_hal("linuxcnc_latency", "latency.hal", "probe-latency.on-delay");
-    let expected_s = expected_s(delay_s);
-    assert_eq!(latencies.len(), 3, "one estimate for each run");
-    for (_, latency) in &latencies {
-        println!(
-            "latency {:.4} ms, u {:.4} ms, in HAL {:.4} ms, with the tick's share {:.4} ms",
-            latency.latency_s * 1e3,
-            latency.standard_uncertainty_s * 1e3,
-            delay_s * 1e3,
-            expected_s * 1e3
-        );
-        assert_eq!(latency.n, 40, "{latency:?}");
-        assert!(
-            (latency.latency_s - expected_s).abs() < 0.1e-3,
-            "{latency:?}"
-        );
-        assert!(
-            (latency.latency_s - delay_s).abs() < 0.1e-3 + TICK_S / 2.0,
-            "{latency:?}"
-        );
-    }
-    let runs = latency_touches(&finished.bag);
-    assert_eq!(runs.len(), 3);
-    assert!(
-        runs[0].is_empty(),
-        "before the first estimate nothing is corrected"
-    );
-    for touches in &runs[1..] {
-        assert_eq!(touches.len(), 40);
-        let feeds = by_feed(touches);
-        assert_eq!(feeds.len(), 5, "{feeds:?}");
-        let (slow_mm_s, slow_mm, _) = feeds[0];
-        for (feed_mm_s, along_mm, n) in &feeds {
-            let away_mm = along_mm - slow_mm;
+    isolated(|| {
+        let Some(finished) = run("linuxcnc_latency") else {
+            return;
+        };
+        let latencies = read(&finished.bag, &topics::LATENCY);
+        let delay_s = in_hal("linuxcnc_latency", "latency.hal", "probe-latency.on-delay");
+        let expected_s = expected_s(delay_s);
+        assert_eq!(latencies.len(), 3, "one estimate for each run");
+        for (_, latency) in &latencies {
             println!(
-                "{:>6.0} mm/min: {n} touches, {:+.3} um from the slowest, a tick's travel {:.1} um",
-                feed_mm_s * 60.0,
-                away_mm * 1e3,
-                feed_mm_s * TICK_S * 1e3
+                "latency {:.4} ms, u {:.4} ms, in HAL {:.4} ms, with the tick's share {:.4} ms",
+                latency.latency_s * 1e3,
+                latency.standard_uncertainty_s * 1e3,
+                delay_s * 1e3,
+                expected_s * 1e3
             );
-            assert_eq!(*n, 8);
+            assert_eq!(latency.n, 40, "{latency:?}");
             assert!(
-                away_mm.abs() <= (feed_mm_s + slow_mm_s) * TICK_S,
-                "{feeds:?}"
+                (latency.latency_s - expected_s).abs() < 0.1e-3,
+                "{latency:?}"
+            );
+            assert!(
+                (latency.latency_s - delay_s).abs() < 0.1e-3 + TICK_S / 2.0,
+                "{latency:?}"
             );
         }
-    }
-    assert!(finished.said.contains("Probe latency"), "{}", finished.said);
-    // The machine file of the scenario has no latency: the diagnosis of its bag finds it as a gap.
-    let (names, [found_ms, low_ms, high_ms]) = named(&finished, "probe_latency", "latency_ms");
-    assert_eq!(names.len(), 1, "{names:?}");
-    assert!((found_ms - expected_s * 1e3).abs() < 0.1, "{found_ms}");
-    assert!(low_ms < found_ms && found_ms < high_ms && high_ms - low_ms < 0.5);
+        let runs = latency_touches(&finished.bag);
+        assert_eq!(runs.len(), 3);
+        assert!(
+            runs[0].is_empty(),
+            "before the first estimate nothing is corrected"
+        );
+        for touches in &runs[1..] {
+            assert_eq!(touches.len(), 40);
+            let feeds = by_feed(touches);
+            assert_eq!(feeds.len(), 5, "{feeds:?}");
+            let (slow_mm_s, slow_mm, _) = feeds[0];
+            for (feed_mm_s, along_mm, n) in &feeds {
+                let away_mm = along_mm - slow_mm;
+                println!(
+                    "{:>6.0} mm/min: {n} touches, {:+.3} um from the slowest, a tick's travel {:.1} um",
+                    feed_mm_s * 60.0,
+                    away_mm * 1e3,
+                    feed_mm_s * TICK_S * 1e3
+                );
+                assert_eq!(*n, 8);
+                assert!(
+                    away_mm.abs() <= (feed_mm_s + slow_mm_s) * TICK_S,
+                    "{feeds:?}"
+                );
+            }
+        }
+        assert!(finished.said.contains("Probe latency"), "{}", finished.said);
+        // The machine file of the scenario has no latency: the diagnosis of its bag finds it as a gap.
+        let (names, [found_ms, low_ms, high_ms]) = named(&finished, "probe_latency", "latency_ms");
+        assert_eq!(names.len(), 1, "{names:?}");
+        assert!((found_ms - expected_s * 1e3).abs() < 0.1, "{found_ms}");
+        assert!(low_ms < found_ms && found_ms < high_ms && high_ms - low_ms < 0.5);
+    });
 }
 
 #[test]
 fn val_linuxcnc_lost_motion_that_only_hal_holds_is_named_with_its_size_from_the_runs_own_bag() {
-    let Some(finished) = run("linuxcnc_gap") else {
-        return;
-    };
-    let half_mm = in_hal("linuxcnc_gap", "effect.hal", "slide-greatest.x.offset");
-    let width_um = 2e3 * half_mm;
-    let (names, [found_um, low_um, high_um]) = named(&finished, "backlash", "width_um");
-    assert_eq!(names, ["backlash X"]);
-    assert!(
-        low_um <= width_um && width_um <= high_um,
-        "{low_um} to {high_um}, {width_um} in HAL"
-    );
-    assert!(low_um < found_um && found_um < high_um && high_um - low_um < 0.2);
-    let gap = finished.gap.as_ref().unwrap();
-    assert_eq!(gap["unknown"]["flagged"], false, "{}", gap["unknown"]);
-    let closed = gap["shrink"]["gap_closed"]["low"].as_f64().unwrap();
-    assert!(closed > 0.99, "{closed}");
+    isolated(|| {
+        let Some(finished) = run("linuxcnc_gap") else {
+            return;
+        };
+        let half_mm = in_hal("linuxcnc_gap", "effect.hal", "slide-greatest.x.offset");
+        let width_um = 2e3 * half_mm;
+        let (names, [found_um, low_um, high_um]) = named(&finished, "backlash", "width_um");
+        assert_eq!(names, ["backlash X"]);
+        assert!(
+            low_um <= width_um && width_um <= high_um,
+            "{low_um} to {high_um}, {width_um} in HAL"
+        );
+        assert!(low_um < found_um && found_um < high_um && high_um - low_um < 0.2);
+        let gap = finished.gap.as_ref().unwrap();
+        assert_eq!(gap["unknown"]["flagged"], false, "{}", gap["unknown"]);
+        let closed = gap["shrink"]["gap_closed"]["low"].as_f64().unwrap();
+        assert!(closed > 0.99, "{closed}");
+    });
 }
 
 #[test]
 fn val_linuxcnc_both_blocks_are_measured_twice_and_every_face_of_them() {
-    let Some(finished) = run("linuxcnc_block_cycle") else {
-        return;
-    };
-    let blocks: Vec<_> = read(&finished.bag, &topics::BLOCKS_MEASUREMENT)
-        .into_iter()
-        .map(|(_, block)| block)
-        .collect();
-    let seen: Vec<(&str, bool)> = blocks
-        .iter()
-        .map(|block| (block.block_id.as_str(), block.cold))
-        .collect();
-    assert_eq!(
-        seen,
-        [
-            ("block_1", true),
-            ("block_2", true),
-            ("block_1", false),
-            ("block_2", false)
-        ]
-    );
-    // Corners of the machine file are those of the HAL file: the simulated blocks stand true.
-    let corners_mm = [[-220.0, -180.0, 20.0], [220.0, 180.0, 200.0]];
-    for (place, block) in blocks.iter().enumerate() {
-        for (axis, corner_mm) in Axis::LINEAR.into_iter().zip(corners_mm[place % 2]) {
-            let face = block.faces[axis].expect("every face is measured");
-            let away_um = (face.position_mm - corner_mm) * 1e3;
-            println!(
-                "{} {axis}: {away_um:+.2} um from nominal, u {:.2} um",
-                block.block_id,
-                face.standard_uncertainty_mm * 1e3
-            );
-            // One touch at 2 mm/s on a control that polls: a tick's travel and the latency's 0.1 ms.
-            assert!(away_um.abs() < 2.5, "{block:?}");
+    isolated(|| {
+        let Some(finished) = run("linuxcnc_block_cycle") else {
+            return;
+        };
+        let blocks: Vec<_> = read(&finished.bag, &topics::BLOCKS_MEASUREMENT)
+            .into_iter()
+            .map(|(_, block)| block)
+            .collect();
+        let seen: Vec<(&str, bool)> = blocks
+            .iter()
+            .map(|block| (block.block_id.as_str(), block.cold))
+            .collect();
+        assert_eq!(
+            seen,
+            [
+                ("block_1", true),
+                ("block_2", true),
+                ("block_1", false),
+                ("block_2", false)
+            ]
+        );
+        // Corners of the machine file are those of the HAL file: the simulated blocks stand true.
+        let corners_mm = [[-220.0, -180.0, 20.0], [220.0, 180.0, 200.0]];
+        for (place, block) in blocks.iter().enumerate() {
+            for (axis, corner_mm) in Axis::LINEAR.into_iter().zip(corners_mm[place % 2]) {
+                let face = block.faces[axis].expect("every face is measured");
+                let away_um = (face.position_mm - corner_mm) * 1e3;
+                println!(
+                    "{} {axis}: {away_um:+.2} um from nominal, u {:.2} um",
+                    block.block_id,
+                    face.standard_uncertainty_mm * 1e3
+                );
+                // One touch at 2 mm/s on a control that polls: a tick's travel and the latency's 0.1 ms.
+                assert!(away_um.abs() < 2.5, "{block:?}");
+            }
         }
-    }
-    let models = read(&finished.bag, &topics::THERMAL_MODEL);
-    assert!(!models.is_empty(), "two block cycles make a model");
+        let models = read(&finished.bag, &topics::THERMAL_MODEL);
+        assert!(!models.is_empty(), "two block cycles make a model");
+    });
 }
 
 #[test]
 fn val_linuxcnc_the_table_of_a_run_takes_out_nine_tenths_of_the_screws_error_when_it_is_loaded() {
-    // On a busy computer the sampler loses records, and a stop with them: the table has a hole then.
-    let mut finished = None;
-    for attempt in 1..=ATTEMPTS {
-        let Some(one) = run("linuxcnc_screw_error") else {
-            return;
-        };
-        let runs = one.report["linuxcnc_table"].as_array().unwrap();
-        let stops: Vec<u64> = runs
-            .iter()
-            .map(|run| run["stops"].as_u64().unwrap())
-            .collect();
-        let whole = stops == [82; 3];
-        println!("attempt {attempt}: {stops:?} of 41 stops up and 41 down");
-        let enough = stops.iter().all(|stops| *stops >= ENOUGH_STOPS);
-        finished = Some((one.report, one.said, whole));
-        if enough {
-            break;
+    isolated(|| {
+        // On a busy computer the sampler loses records, and a stop with them: the table has a hole then.
+        let mut finished = None;
+        for attempt in 1..=ATTEMPTS {
+            let Some(one) = run("linuxcnc_screw_error") else {
+                return;
+            };
+            let runs = one.report["linuxcnc_table"].as_array().unwrap();
+            let stops: Vec<u64> = runs
+                .iter()
+                .map(|run| run["stops"].as_u64().unwrap())
+                .collect();
+            let whole = stops == [82; 3];
+            println!("attempt {attempt}: {stops:?} of 41 stops up and 41 down");
+            let enough = stops.iter().all(|stops| *stops >= ENOUGH_STOPS);
+            finished = Some((one.report, one.said, whole));
+            if enough {
+                break;
+            }
         }
-    }
-    let (report, said, whole) = finished.unwrap();
-    let runs = report["linuxcnc_table"].as_array().unwrap();
-    let of = |name: &str| runs.iter().find(|one| one["run"] == name).unwrap();
-    let um = |name: &str, key: &str| of(name)[key].as_f64().unwrap() * 1e3;
-    let (bare, with, turned) = ("without a table", "with the table", "with its sign turned");
-    for name in [bare, with, turned] {
-        println!(
-            "{name}: at most {:.2} um, p95 {:.2} um, between the table's points {:.2} um, rms {:.3} um",
-            um(name, "max_mm"),
-            um(name, "p95_mm"),
-            um(name, "p95_between_mm"),
-            um(name, "rms_mm")
+        let (report, said, whole) = finished.unwrap();
+        let runs = report["linuxcnc_table"].as_array().unwrap();
+        let of = |name: &str| runs.iter().find(|one| one["run"] == name).unwrap();
+        let um = |name: &str, key: &str| of(name)[key].as_f64().unwrap() * 1e3;
+        let (bare, with, turned) = ("without a table", "with the table", "with its sign turned");
+        for name in [bare, with, turned] {
+            println!(
+                "{name}: at most {:.2} um, p95 {:.2} um, between the table's points {:.2} um, rms {:.3} um",
+                um(name, "max_mm"),
+                um(name, "p95_mm"),
+                um(name, "p95_between_mm"),
+                um(name, "rms_mm")
+            );
+        }
+        assert!(
+            um(bare, "max_mm") > 30.0,
+            "the scenario has a screw with errors"
         );
-    }
-    assert!(
-        um(bare, "max_mm") > 30.0,
-        "the scenario has a screw with errors"
-    );
-    let judged = ["rms_mm", "p95_mm", "p95_between_mm", "max_mm"];
-    for key in &judged[..if whole { 4 } else { 2 }] {
-        assert!(um(with, key) < 0.1 * um(bare, key), "{key}");
-    }
-    let ratio = um(turned, "rms_mm") / um(bare, "rms_mm");
-    assert!((1.9..2.1).contains(&ratio), "{ratio}");
-    let title = "The exported table on the control itself";
-    assert!(said.contains(title), "{said}");
+        let judged = ["rms_mm", "p95_mm", "p95_between_mm", "max_mm"];
+        for key in &judged[..if whole { 4 } else { 2 }] {
+            assert!(um(with, key) < 0.1 * um(bare, key), "{key}");
+        }
+        let ratio = um(turned, "rms_mm") / um(bare, "rms_mm");
+        assert!((1.9..2.1).contains(&ratio), "{ratio}");
+        let title = "The exported table on the control itself";
+        assert!(said.contains(title), "{said}");
+    });
 }

@@ -4,13 +4,13 @@
 
 use std::path::PathBuf;
 use std::process::Command;
-use std::sync::PoisonError;
 
+use abbe_tests::namespace::isolated;
 use abbe_tests::program::abbe;
 use abbe_tests::scenario::Scenario;
 use serde_json::Value;
 
-use crate::{DOMAIN, ONE_AT_A_TIME, installed, root};
+use crate::{DOMAIN, installed, root};
 
 /// Width of the gap that the scenario's HAL file has, and the one that the simulator gets, µm.
 const MACHINE_UM: f64 = 9.0;
@@ -48,46 +48,47 @@ fn recorded(width_um: f64) -> (Scenario, PathBuf) {
 
 #[test]
 fn val_linuxcnc_as_the_simulator_leaves_the_lost_motion_that_the_machine_has_more() {
-    if !installed() {
-        return;
-    }
-    let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let home = tempfile::tempdir().unwrap();
-    let (_machine, real) = recorded(MACHINE_UM);
-    let (_simulator, simulator) = recorded(SIMULATOR_UM);
-    let json = home.path().join("gap.json");
-    let machine = root().join("launch_configs/linuxcnc_gap/machine.yaml");
-    let ended = Command::new(abbe())
-        .arg("diagnose")
-        .arg(&real)
-        .arg("--simulated")
-        .arg(&simulator)
-        .arg("--machine")
-        .arg(&machine)
-        .arg("--json")
-        .arg(&json)
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&ended.stderr);
-    assert_eq!(ended.status.code(), Some(0), "{said}");
-    let gap: Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
-    let causes = gap["causes"].as_array().unwrap().iter();
-    let named: Vec<&Value> = causes.filter(|cause| cause["status"] == "named").collect();
-    let [play] = named[..] else {
-        panic!("{:#}", gap["causes"]);
-    };
-    assert_eq!(
-        (&play["effect"], &play["axis"]),
-        (&"backlash".into(), &"X".into())
-    );
-    let width_um = play["parameters"][0]["value"].as_f64().unwrap();
-    let more_um = MACHINE_UM - SIMULATOR_UM;
-    println!("backlash X {width_um:.3} um; the machine has {more_um} um more");
-    assert!((width_um - more_um).abs() < 0.2, "{width_um}");
-    let closed = gap["shrink"]["gap_closed"]["low"].as_f64().unwrap();
-    assert!(closed > 0.95, "{closed}");
-    assert_eq!(
-        gap["simulated"]["runs"]["matched"],
-        gap["simulated"]["runs"]["of"]
-    );
+    isolated(|| {
+        if !installed() {
+            return;
+        }
+        let home = tempfile::tempdir().unwrap();
+        let (_machine, real) = recorded(MACHINE_UM);
+        let (_simulator, simulator) = recorded(SIMULATOR_UM);
+        let json = home.path().join("gap.json");
+        let machine = root().join("launch_configs/linuxcnc_gap/machine.yaml");
+        let ended = Command::new(abbe())
+            .arg("diagnose")
+            .arg(&real)
+            .arg("--simulated")
+            .arg(&simulator)
+            .arg("--machine")
+            .arg(&machine)
+            .arg("--json")
+            .arg(&json)
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(0), "{said}");
+        let gap: Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+        let causes = gap["causes"].as_array().unwrap().iter();
+        let named: Vec<&Value> = causes.filter(|cause| cause["status"] == "named").collect();
+        let [play] = named[..] else {
+            panic!("{:#}", gap["causes"]);
+        };
+        assert_eq!(
+            (&play["effect"], &play["axis"]),
+            (&"backlash".into(), &"X".into())
+        );
+        let width_um = play["parameters"][0]["value"].as_f64().unwrap();
+        let more_um = MACHINE_UM - SIMULATOR_UM;
+        println!("backlash X {width_um:.3} um; the machine has {more_um} um more");
+        assert!((width_um - more_um).abs() < 0.2, "{width_um}");
+        let closed = gap["shrink"]["gap_closed"]["low"].as_f64().unwrap();
+        assert!(closed > 0.95, "{closed}");
+        assert_eq!(
+            gap["simulated"]["runs"]["matched"],
+            gap["simulated"]["runs"]["of"]
+        );
+    });
 }

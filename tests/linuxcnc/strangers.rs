@@ -21,14 +21,15 @@ use abbe_msgs::{
 };
 use abbe_tests::asker::{Asker, service};
 use abbe_tests::graph::{Graph, Voice, now, port};
+use abbe_tests::namespace::isolated;
 use abbe_tests::said::compensation;
 use abbe_tests::zenoh::environment;
 use linuxcnc_bridge::io::start::Controller;
 use nix::sys::signal::Signal;
 use node_runtime::node::TopicPort;
 
+use crate::installed;
 use crate::killed::{Desk, NONE_MM, OFFSET_MM, RATE_MM_S, START, controller, offset_mm, pin};
-use crate::{ONE_AT_A_TIME, installed};
 
 const BRIDGE: &str = "linuxcnc_bridge";
 /// Y goes there and back in a minute; X stands.
@@ -528,57 +529,56 @@ fn ends_at_zero(controller: &Controller, ended_at: Instant) {
 
 #[test]
 fn strangers_neither_move_a_machine_nor_step_its_offsets_nor_end_its_program() {
-    if !installed() {
-        return;
-    }
-    let _turn = ONE_AT_A_TIME
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
-    let controller = controller();
-    let desk = Desk::new(17);
-    let graph = &desk.graph;
-    let author = Author::of(graph);
-    let (bridge, probe) = (desk.node(BRIDGE), desk.node("probe"));
-    settles(graph, OFFSET_MM, || {});
-    let began = Instant::now();
-    let mut stranger = Stranger::on(&desk);
+    isolated(|| {
+        if !installed() {
+            return;
+        }
+        let controller = controller();
+        let desk = Desk::new(17);
+        let graph = &desk.graph;
+        let author = Author::of(graph);
+        let (bridge, probe) = (desk.node(BRIDGE), desk.node("probe"));
+        settles(graph, OFFSET_MM, || {});
+        let began = Instant::now();
+        let mut stranger = Stranger::on(&desk);
 
-    let begun = Instant::now();
-    let sequencer = desk.running(PROGRAM);
-    under_way(graph, begun);
-    asks(graph, &mut stranger);
-    anothers_offsets(graph, &mut stranger);
-    bad_offsets(graph, &mut stranger);
-    flood(graph, &mut stranger);
-    speaks_for_the_bridge(graph, &mut stranger);
-    another_type(graph);
-    let status = desk.ended(begun);
-    assert_eq!(status.state, PlanStatus::STATE_DONE, "{status:?}");
-    sequencer.stop();
-    settles(graph, OFFSET_MM, || {});
-    bad_programs(graph, &mut stranger);
-    puts_to_rest(&desk, &mut stranger);
+        let begun = Instant::now();
+        let sequencer = desk.running(PROGRAM);
+        under_way(graph, begun);
+        asks(graph, &mut stranger);
+        anothers_offsets(graph, &mut stranger);
+        bad_offsets(graph, &mut stranger);
+        flood(graph, &mut stranger);
+        speaks_for_the_bridge(graph, &mut stranger);
+        another_type(graph);
+        let status = desk.ended(begun);
+        assert_eq!(status.state, PlanStatus::STATE_DONE, "{status:?}");
+        sequencer.stop();
+        settles(graph, OFFSET_MM, || {});
+        bad_programs(graph, &mut stranger);
+        puts_to_rest(&desk, &mut stranger);
 
-    // Its author falls silent; who names other axes alone does not keep the offset.
-    author.stop();
-    settles(graph, 0.0, || {
-        let mut said = compensation(&now(), WANTED_M);
-        said.axis[0] = "A".to_owned();
-        stranger.voice.say(OFFSETS, &said);
+        // Its author falls silent; who names other axes alone does not keep the offset.
+        author.stop();
+        settles(graph, 0.0, || {
+            let mut said = compensation(&now(), WANTED_M);
+            said.axis[0] = "A".to_owned();
+            stranger.voice.say(OFFSETS, &said);
+        });
+        too_large_offset(graph, &mut stranger);
+        let author = Author::of(graph);
+        settles(graph, OFFSET_MM, || {});
+        judge(&states(graph, began));
+        bridge.signal(Signal::SIGINT);
+        let ended = bridge.ended_within(Duration::from_secs(60));
+        assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
+        assert!(!ended.said.contains("panicked"), "{}", ended.said);
+        // What the library says of every broken message would fill a disk.
+        assert!(!ended.said.contains("null terminator"), "{}", ended.said);
+        ends_at_zero(&controller, Instant::now());
+        author.stop();
+        stranger.stop();
+        probe.stop();
+        desk.voice.stop();
     });
-    too_large_offset(graph, &mut stranger);
-    let author = Author::of(graph);
-    settles(graph, OFFSET_MM, || {});
-    judge(&states(graph, began));
-    bridge.signal(Signal::SIGINT);
-    let ended = bridge.ended_within(Duration::from_secs(60));
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
-    assert!(!ended.said.contains("panicked"), "{}", ended.said);
-    // What the library says of every broken message would fill a disk.
-    assert!(!ended.said.contains("null terminator"), "{}", ended.said);
-    ends_at_zero(&controller, Instant::now());
-    author.stop();
-    stranger.stop();
-    probe.stop();
-    desk.voice.stop();
 }

@@ -16,7 +16,6 @@ pub mod fast_dds;
 pub mod foreseen;
 pub mod graph;
 pub mod hosts;
-pub mod namespace;
 pub mod operator;
 pub mod program;
 pub mod python;
@@ -24,3 +23,5 @@ pub mod said;
 pub mod scenario;
 pub mod security;
 pub mod zenoh;
+
+pub use test_namespaces as namespace;

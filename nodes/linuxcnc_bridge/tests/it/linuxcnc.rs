@@ -1,6 +1,6 @@
 //! A real LinuxCNC behind the bridge, without a display, as an ordinary user.
 //!
-//! Only one LinuxCNC runs on a computer: the tests wait for each other, also across processes.
+//! Only one LinuxCNC runs on a computer: each test has namespaces of its own, in which it is the only one.
 //! Where LinuxCNC is not installed nothing can be tested: that is a failure where `CI=true`, and is
 //! said elsewhere.
 

@@ -7,6 +7,7 @@ use linuxcnc_bridge::io::host_now;
 use linuxcnc_bridge::live::LiveInput;
 use metrology::sample::{AxisCompensation, CompensationState};
 use metrology::{Axis, AxisSet, PerAxis};
+use test_namespaces::isolated;
 
 use crate::linuxcnc::rig::Rig;
 
@@ -43,53 +44,55 @@ fn greatest_rate_mm_s(rig: &Rig) -> f64 {
 
 #[test]
 fn offsets_reach_the_motor_without_a_step_and_fade_when_their_source_dies() {
-    let Some(mut rig) = Rig::new("linuxcnc_latency") else {
-        return;
-    };
-    rig.states.clear();
-    for _ in 0..500 {
-        rig.tell(offsets(0.030));
-        rig.turn();
-    }
-    assert!(
-        (offset_mm(&rig) - 0.030).abs() < 2e-6,
-        "{}",
-        offset_mm(&rig)
-    );
-    assert!(rig.conditions.contains(&Condition::CompensationFresh));
+    isolated(|| {
+        let Some(mut rig) = Rig::new("linuxcnc_latency") else {
+            return;
+        };
+        rig.states.clear();
+        for _ in 0..500 {
+            rig.tell(offsets(0.030));
+            rig.turn();
+        }
+        assert!(
+            (offset_mm(&rig) - 0.030).abs() < 2e-6,
+            "{}",
+            offset_mm(&rig)
+        );
+        assert!(rig.conditions.contains(&Condition::CompensationFresh));
 
-    // Too large and not a number: refused, the last good one stays.
-    for bad in [5.0, f64::NAN] {
-        rig.tell(offsets(bad));
-    }
-    assert!(matches!(
-        rig.conditions.last(),
-        Some(Condition::CompensationRefused { .. })
-    ));
-    for _ in 0..40 {
-        rig.tell(offsets(-0.020));
-        rig.turn();
-    }
-    assert!(
-        offset_mm(&rig) > -0.02 && offset_mm(&rig) < 0.030,
-        "{}",
-        offset_mm(&rig)
-    );
+        // Too large and not a number: refused, the last good one stays.
+        for bad in [5.0, f64::NAN] {
+            rig.tell(offsets(bad));
+        }
+        assert!(matches!(
+            rig.conditions.last(),
+            Some(Condition::CompensationRefused { .. })
+        ));
+        for _ in 0..40 {
+            rig.tell(offsets(-0.020));
+            rig.turn();
+        }
+        assert!(
+            offset_mm(&rig) > -0.02 && offset_mm(&rig) < 0.030,
+            "{}",
+            offset_mm(&rig)
+        );
 
-    // Silence: HAL waits for 2 s, then fades at its own rate.
-    rig.turn_for(Duration::from_secs(3));
-    assert!(
-        rig.conditions
-            .iter()
-            .any(|c| matches!(c, Condition::CompensationStale { .. }))
-    );
-    rig.turn_for(Duration::from_secs(3));
-    assert!(offset_mm(&rig).abs() < 2e-6, "{}", offset_mm(&rig));
-    let rate_mm_s = greatest_rate_mm_s(&rig);
-    println!("greatest rate of the motor {rate_mm_s:.4} mm/s");
-    // HAL's limit is 0.02 mm/s; positions are printed to 1 nm.
-    assert!(rate_mm_s < 0.0225, "{rate_mm_s} mm/s");
-    deactivated_it_lets_go(&mut rig);
+        // Silence: HAL waits for 2 s, then fades at its own rate.
+        rig.turn_for(Duration::from_secs(3));
+        assert!(
+            rig.conditions
+                .iter()
+                .any(|c| matches!(c, Condition::CompensationStale { .. }))
+        );
+        rig.turn_for(Duration::from_secs(3));
+        assert!(offset_mm(&rig).abs() < 2e-6, "{}", offset_mm(&rig));
+        let rate_mm_s = greatest_rate_mm_s(&rig);
+        println!("greatest rate of the motor {rate_mm_s:.4} mm/s");
+        // HAL's limit is 0.02 mm/s; positions are printed to 1 nm.
+        assert!(rate_mm_s < 0.0225, "{rate_mm_s} mm/s");
+        deactivated_it_lets_go(&mut rig);
+    });
 }
 
 /// Not active, the bridge hears no offsets and takes no program, and HAL fades what it has.

@@ -3,6 +3,7 @@
 use std::num::NonZeroU32;
 
 use machine::cycle::{Cycle, blocks, latency};
+use test_namespaces::isolated;
 
 use crate::linuxcnc::latency::{on_delay_s, weighted_line};
 use crate::linuxcnc::rig::Rig;
@@ -39,27 +40,29 @@ fn touch_all(rig: &mut Rig, cycle: &Cycle) -> Vec<(f64, f64)> {
 
 #[test]
 fn the_latency_cycle_gives_the_delay_that_only_hal_holds() {
-    let Some(mut rig) = Rig::new("linuxcnc_latency") else {
-        return;
-    };
-    let feeds_mm_min = [120.0, 300.0, 600.0, 1200.0, 1800.0];
-    let repeats = NonZeroU32::new(8).unwrap();
-    for feature in ["block_1.x", "block_1.z"] {
-        let cycle = latency(&rig.machine, feature, &feeds_mm_min, repeats).unwrap();
-        let (latency_s, surface_mm) = weighted_line(&touch_all(&mut rig, &cycle));
-        let delay_s = on_delay_s();
-        let expected_s = ((delay_s / PERIOD_S).ceil() - 0.5) * PERIOD_S;
-        println!(
-            "{feature}: latency {:.4} ms, surface {:.2} um",
-            latency_s * 1e3,
-            surface_mm * 1e3
-        );
-        assert!(
-            (latency_s - expected_s).abs() < 0.1e-3,
-            "{latency_s} s, {expected_s} s"
-        );
-        assert!(surface_mm.abs() < 1e-3, "{surface_mm} mm");
-    }
+    isolated(|| {
+        let Some(mut rig) = Rig::new("linuxcnc_latency") else {
+            return;
+        };
+        let feeds_mm_min = [120.0, 300.0, 600.0, 1200.0, 1800.0];
+        let repeats = NonZeroU32::new(8).unwrap();
+        for feature in ["block_1.x", "block_1.z"] {
+            let cycle = latency(&rig.machine, feature, &feeds_mm_min, repeats).unwrap();
+            let (latency_s, surface_mm) = weighted_line(&touch_all(&mut rig, &cycle));
+            let delay_s = on_delay_s();
+            let expected_s = ((delay_s / PERIOD_S).ceil() - 0.5) * PERIOD_S;
+            println!(
+                "{feature}: latency {:.4} ms, surface {:.2} um",
+                latency_s * 1e3,
+                surface_mm * 1e3
+            );
+            assert!(
+                (latency_s - expected_s).abs() < 0.1e-3,
+                "{latency_s} s, {expected_s} s"
+            );
+            assert!(surface_mm.abs() < 1e-3, "{surface_mm} mm");
+        }
+    });
 }
 
 fn block_cycle_on(scenario: &str) {
@@ -79,10 +82,14 @@ fn block_cycle_on(scenario: &str) {
 
 #[test]
 fn the_block_cycle_finds_both_blocks_with_three_axes() {
-    block_cycle_on("linuxcnc_latency");
+    isolated(|| {
+        block_cycle_on("linuxcnc_latency");
+    });
 }
 
 #[test]
 fn the_block_cycle_finds_both_blocks_with_five_axes() {
-    block_cycle_on("linuxcnc_block_cycle");
+    isolated(|| {
+        block_cycle_on("linuxcnc_block_cycle");
+    });
 }

@@ -6,50 +6,53 @@ use linuxcnc_bridge::condition::Condition;
 use linuxcnc_bridge::fault::FaultKind;
 use linuxcnc_bridge::live::LiveInput;
 use linuxcnc_bridge::run::Outcome;
+use test_namespaces::isolated;
 
 use crate::linuxcnc::rig::Rig;
 
 #[test]
 fn each_fault_ends_the_program_with_its_own_outcome() {
-    let Some(mut rig) = Rig::new("linuxcnc_latency") else {
-        return;
-    };
+    isolated(|| {
+        let Some(mut rig) = Rig::new("linuxcnc_latency") else {
+            return;
+        };
 
-    let missed = rig.run("G21 G90\nG0 X0 Y0 Z10\nG38.2 Z8 F300\nM2\n");
-    assert_eq!(
-        (missed.outcome, missed.line),
-        (Outcome::ProbeMissed, 3),
-        "{missed:?}"
-    );
-    assert!(
-        missed.message.contains("without making contact"),
-        "{missed:?}"
-    );
+        let missed = rig.run("G21 G90\nG0 X0 Y0 Z10\nG38.2 Z8 F300\nM2\n");
+        assert_eq!(
+            (missed.outcome, missed.line),
+            (Outcome::ProbeMissed, 3),
+            "{missed:?}"
+        );
+        assert!(
+            missed.message.contains("without making contact"),
+            "{missed:?}"
+        );
 
-    let limit = rig.run("G21 G90\nG1 X5 F600\nG1 X400 F600\nM2\n");
-    assert_eq!(limit.outcome, Outcome::Limit, "{limit:?}");
-    assert!(
-        limit
-            .message
-            .contains("line 3 would exceed X's positive limit"),
-        "{limit:?}"
-    );
+        let limit = rig.run("G21 G90\nG1 X5 F600\nG1 X400 F600\nM2\n");
+        assert_eq!(limit.outcome, Outcome::Limit, "{limit:?}");
+        assert!(
+            limit
+                .message
+                .contains("line 3 would exceed X's positive limit"),
+            "{limit:?}"
+        );
 
-    let malformed = rig.run("G21 G90\nG1 X1O F600\nM2\n");
-    assert_eq!(malformed.outcome, Outcome::Refused, "{malformed:?}");
+        let malformed = rig.run("G21 G90\nG1 X1O F600\nM2\n");
+        assert_eq!(malformed.outcome, Outcome::Refused, "{malformed:?}");
 
-    let empty = rig.run("  \n");
-    assert_eq!(
-        (empty.outcome, empty.message.as_str()),
-        (Outcome::Refused, "the program is empty")
-    );
+        let empty = rig.run("  \n");
+        assert_eq!(
+            (empty.outcome, empty.message.as_str()),
+            (Outcome::Refused, "the program is empty")
+        );
 
-    let short = rig.run("G21 G90\nM2\n");
-    assert_eq!((short.outcome, short.message.as_str()), (Outcome::Done, ""));
+        let short = rig.run("G21 G90\nM2\n");
+        assert_eq!((short.outcome, short.message.as_str()), (Outcome::Done, ""));
 
-    called_off(&mut rig);
-    stuck_probe(&mut rig);
-    emergency_stop(&mut rig);
+        called_off(&mut rig);
+        stuck_probe(&mut rig);
+        emergency_stop(&mut rig);
+    });
 }
 
 fn called_off(rig: &mut Rig) {
@@ -99,43 +102,45 @@ fn emergency_stop(rig: &mut Rig) {
 
 #[test]
 fn a_drive_that_lags_ends_the_program_and_a_restarted_controller_is_found_again() {
-    let Some(mut rig) = Rig::new("linuxcnc_latency") else {
-        return;
-    };
-    rig.run("G21 G90\nG1 X10 F1200\nM2\n");
-    rig.halcmd(&["unlinkp", "joint.0.motor-pos-fb"]);
-    let lagging = rig.run("G21 G90\nG1 X60 F1200\nM2\n");
-    assert_eq!(lagging.outcome, Outcome::Fault, "{lagging:?}");
-    assert!(
-        lagging.message.contains("joint 0 following error"),
-        "{lagging:?}"
-    );
-    assert!(rig.conditions.iter().any(|condition| matches!(
-        condition,
-        Condition::ControllerError {
-            kind: FaultKind::FollowingError,
-            ..
+    isolated(|| {
+        let Some(mut rig) = Rig::new("linuxcnc_latency") else {
+            return;
+        };
+        rig.run("G21 G90\nG1 X10 F1200\nM2\n");
+        rig.halcmd(&["unlinkp", "joint.0.motor-pos-fb"]);
+        let lagging = rig.run("G21 G90\nG1 X60 F1200\nM2\n");
+        assert_eq!(lagging.outcome, Outcome::Fault, "{lagging:?}");
+        assert!(
+            lagging.message.contains("joint 0 following error"),
+            "{lagging:?}"
+        );
+        assert!(rig.conditions.iter().any(|condition| matches!(
+            condition,
+            Condition::ControllerError {
+                kind: FaultKind::FollowingError,
+                ..
+            }
+        )));
+
+        rig.end_controller();
+        let refused = rig.run("G21\nM2\n");
+        assert_eq!(refused.message, "not connected to the controller");
+        rig.start_controller();
+        let done = rig.run("G21 G90\nG1 X10 F1200\nM2\n");
+        assert_eq!(done.outcome, Outcome::Done, "{done:?}");
+        for pair in rig.states.windows(2) {
+            assert!((pair[1].controller_at - pair[0].controller_at).nanos() > 0);
         }
-    )));
 
-    rig.end_controller();
-    let refused = rig.run("G21\nM2\n");
-    assert_eq!(refused.message, "not connected to the controller");
-    rig.start_controller();
-    let done = rig.run("G21 G90\nG1 X10 F1200\nM2\n");
-    assert_eq!(done.outcome, Outcome::Done, "{done:?}");
-    for pair in rig.states.windows(2) {
-        assert!((pair[1].controller_at - pair[0].controller_at).nanos() > 0);
-    }
-
-    let goal = rig.begin("G21 G90\nG1 X200 F60\nM2\n");
-    rig.turn_for(Duration::from_secs(2));
-    rig.end_controller();
-    let lost = rig.finish(goal);
-    assert_eq!(lost.outcome, Outcome::Fault, "{lost:?}");
-    assert!(
-        lost.message
-            .contains("connection to the controller was lost"),
-        "{lost:?}"
-    );
+        let goal = rig.begin("G21 G90\nG1 X200 F60\nM2\n");
+        rig.turn_for(Duration::from_secs(2));
+        rig.end_controller();
+        let lost = rig.finish(goal);
+        assert_eq!(lost.outcome, Outcome::Fault, "{lost:?}");
+        assert!(
+            lost.message
+                .contains("connection to the controller was lost"),
+            "{lost:?}"
+        );
+    });
 }

@@ -1,6 +1,7 @@
 //! Touches at five feeds against a delay that only the HAL file holds.
 
 use metrology::Axis;
+use test_namespaces::isolated;
 
 use crate::linuxcnc::rig::{Rig, read, scenario};
 
@@ -55,57 +56,59 @@ pub fn on_delay_s() -> f64 {
 
 #[test]
 fn touches_at_five_feeds_give_the_delay_that_only_hal_holds() {
-    let Some(mut rig) = Rig::new("linuxcnc_latency") else {
-        return;
-    };
-    let log = rig.controller.as_ref().unwrap().folder().join("probed.txt");
-    rig.touch(&program(&log.display().to_string()));
-    assert_eq!(rig.triggers.len(), FEEDS_MM_S.len() * REPEATS as usize);
+    isolated(|| {
+        let Some(mut rig) = Rig::new("linuxcnc_latency") else {
+            return;
+        };
+        let log = rig.controller.as_ref().unwrap().folder().join("probed.txt");
+        rig.touch(&program(&log.display().to_string()));
+        assert_eq!(rig.triggers.len(), FEEDS_MM_S.len() * REPEATS as usize);
 
-    // The controller's own probed positions are the ones that were published.
-    let own: Vec<f64> = read(&log)
-        .lines()
-        .map(|line| line.split_whitespace().next().unwrap().parse().unwrap())
-        .collect();
-    assert_eq!(own.len(), rig.triggers.len());
-    for (own_mm, trigger) in own.iter().zip(&rig.triggers) {
-        assert!(
-            (own_mm - trigger.latched[Axis::X]).abs() < 2e-6,
-            "{own_mm} {trigger:?}"
-        );
-        assert_eq!(trigger.feature_id, "block_1/x");
-        assert!((trigger.approach.x - 1.0).abs() < 1e-9);
-    }
-    let points: Vec<(f64, f64)> = rig
-        .triggers
-        .iter()
-        .map(|t| (t.feed_mm_s, t.latched[Axis::X]))
-        .collect();
-    for (touches, feed_mm_s) in points.chunks(REPEATS as usize).zip(FEEDS_MM_S) {
-        let waits_ms: Vec<f64> = touches
-            .iter()
-            .map(|(f, x)| (x - CONTACT_MM) / f * 1000.0)
+        // The controller's own probed positions are the ones that were published.
+        let own: Vec<f64> = read(&log)
+            .lines()
+            .map(|line| line.split_whitespace().next().unwrap().parse().unwrap())
             .collect();
-        println!("{feed_mm_s} mm/s: waits {waits_ms:.3?} ms");
-        assert!(
-            touches
+        assert_eq!(own.len(), rig.triggers.len());
+        for (own_mm, trigger) in own.iter().zip(&rig.triggers) {
+            assert!(
+                (own_mm - trigger.latched[Axis::X]).abs() < 2e-6,
+                "{own_mm} {trigger:?}"
+            );
+            assert_eq!(trigger.feature_id, "block_1/x");
+            assert!((trigger.approach.x - 1.0).abs() < 1e-9);
+        }
+        let points: Vec<(f64, f64)> = rig
+            .triggers
+            .iter()
+            .map(|t| (t.feed_mm_s, t.latched[Axis::X]))
+            .collect();
+        for (touches, feed_mm_s) in points.chunks(REPEATS as usize).zip(FEEDS_MM_S) {
+            let waits_ms: Vec<f64> = touches
                 .iter()
-                .all(|(feed, _)| (feed - feed_mm_s).abs() < 0.01 * feed_mm_s)
+                .map(|(f, x)| (x - CONTACT_MM) / f * 1000.0)
+                .collect();
+            println!("{feed_mm_s} mm/s: waits {waits_ms:.3?} ms");
+            assert!(
+                touches
+                    .iter()
+                    .all(|(feed, _)| (feed - feed_mm_s).abs() < 0.01 * feed_mm_s)
+            );
+        }
+        let (latency_s, surface_mm) = weighted_line(&points);
+        let delay_s = on_delay_s();
+        let expected_s = ((delay_s / PERIOD_S).ceil() - 1.0) * PERIOD_S + 0.5 * PERIOD_S;
+        println!(
+            "latency {:.4} ms, in HAL {:.4} ms, with the period's share (3) {:.4} ms, surface {surface_mm:.6} mm",
+            latency_s * 1e3,
+            delay_s * 1e3,
+            expected_s * 1e3
         );
-    }
-    let (latency_s, surface_mm) = weighted_line(&points);
-    let delay_s = on_delay_s();
-    let expected_s = ((delay_s / PERIOD_S).ceil() - 1.0) * PERIOD_S + 0.5 * PERIOD_S;
-    println!(
-        "latency {:.4} ms, in HAL {:.4} ms, with the period's share (3) {:.4} ms, surface {surface_mm:.6} mm",
-        latency_s * 1e3,
-        delay_s * 1e3,
-        expected_s * 1e3
-    );
-    assert!((latency_s - expected_s).abs() < 0.1e-3);
-    assert!((latency_s - delay_s).abs() < 0.1e-3 + 0.5 * PERIOD_S);
-    assert!((surface_mm - CONTACT_MM).abs() < 1e-3);
-    check_stream(&rig);
+        assert!((latency_s - expected_s).abs() < 0.1e-3);
+        assert!((latency_s - delay_s).abs() < 0.1e-3 + 0.5 * PERIOD_S);
+        assert!((surface_mm - CONTACT_MM).abs() < 1e-3);
+        check_stream(&rig);
+    });
 }
 
 fn check_stream(rig: &Rig) {

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use linuxcnc_bridge::condition::Condition;
@@ -12,7 +11,7 @@ use linuxcnc_bridge::io::start::{Controller, require_installed};
 use linuxcnc_bridge::io::{Address, BridgeIo, host_now};
 use linuxcnc_bridge::live::{LiveBridge, LiveInput};
 use linuxcnc_bridge::run::{Ending, Outcome};
-use linuxcnc_bridge::{BridgeConfig, BridgeError, BridgeStage, Output, Settings};
+use linuxcnc_bridge::{BridgeConfig, BridgeStage, Output, Settings};
 use machine::file::MachineFile;
 use metrology::Stage;
 use metrology::sample::{AxisState, ProbeTrigger};
@@ -20,8 +19,6 @@ use serde::Deserialize;
 
 /// How often a program of touches is tried.
 const ATTEMPTS: u32 = 3;
-
-static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 #[derive(Deserialize)]
 struct NodeParameters {
@@ -43,7 +40,6 @@ pub struct Rig {
     pub config: BridgeConfig,
     ini: PathBuf,
     next_goal: u64,
-    _turn: MutexGuard<'static, ()>,
 }
 
 pub fn scenario(name: &str) -> PathBuf {
@@ -68,19 +64,7 @@ pub fn installed() -> bool {
 }
 
 fn start(config: &BridgeConfig, ini: &Path) -> Controller {
-    let deadline = Instant::now() + Duration::from_secs(600);
-    loop {
-        match Controller::start(config, ini) {
-            Ok(controller) => return controller,
-            Err(
-                error @ (BridgeError::StartedElsewhere { .. } | BridgeError::AlreadyRunning { .. }),
-            ) => {
-                assert!(Instant::now() < deadline, "{error}");
-                pause(Duration::from_secs(1));
-            }
-            Err(error) => panic!("{error}"),
-        }
-    }
+    Controller::start(config, ini).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn pause(time: Duration) {
@@ -98,9 +82,6 @@ impl Rig {
         if !installed() {
             return None;
         }
-        let turn = ONE_AT_A_TIME
-            .lock()
-            .unwrap_or_else(|poisoned| poisoned.into_inner());
         let file: BTreeMap<String, NodeParameters> =
             serde_saphyr::from_str(&read(&folder.join("linuxcnc_bridge.yaml"))).unwrap();
         let config = file.into_values().next().unwrap().parameters;
@@ -132,7 +113,6 @@ impl Rig {
             config,
             ini,
             next_goal: 0,
-            _turn: turn,
         };
         rig.wait_ready();
         Some(rig)

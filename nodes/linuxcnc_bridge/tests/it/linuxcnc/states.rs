@@ -14,6 +14,7 @@ use machine::file::AxisEntry;
 use metrology::sample::AxisState;
 use metrology::{Axis, Severity};
 use nalgebra::Vector3;
+use test_namespaces::isolated;
 
 use crate::linuxcnc::rig::Rig;
 
@@ -289,10 +290,14 @@ fn on(scenario: &str) {
 
 #[test]
 fn val_linuxcnc_no_modal_state_shifts_a_measurement_with_three_axes() {
-    on("linuxcnc_latency");
+    isolated(|| {
+        on("linuxcnc_latency");
+    });
 }
 
 #[test]
 fn val_linuxcnc_no_modal_state_shifts_a_measurement_with_five_axes() {
-    on("linuxcnc_block_cycle");
+    isolated(|| {
+        on("linuxcnc_block_cycle");
+    });
 }

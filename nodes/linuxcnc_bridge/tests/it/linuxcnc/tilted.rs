@@ -2,6 +2,7 @@
 
 use metrology::Axis;
 use nalgebra::Vector3;
+use test_namespaces::isolated;
 
 use crate::linuxcnc::rig::Rig;
 
@@ -31,38 +32,41 @@ fn workpiece_from_machine(position_mm: Vector3<f64>, a_rad: f64) -> Vector3<f64>
 
 #[test]
 fn a_block_is_found_at_its_place_level_and_tilted() {
-    let Some(mut rig) = Rig::new("linuxcnc_block_cycle") else {
-        return;
-    };
-    rig.touch(&program());
-    assert_eq!(rig.triggers.len(), 6);
-    // 2 mm/s and at most 6 ms from contact to latch.
-    let tolerance_mm = 0.012;
-    for trigger in &rig.triggers {
-        let point_mm = workpiece_from_machine(trigger.latched.xyz(), trigger.latched[Axis::A]);
-        let approach = workpiece_from_machine(trigger.approach, trigger.latched[Axis::A])
-            - workpiece_from_machine(Vector3::zeros(), trigger.latched[Axis::A]);
-        let (axis, contact_mm, sign) = match &trigger.feature_id[trigger.feature_id.len() - 1..] {
-            "x" => (0, -223.0, 1.0),
-            "y" => (1, -183.0, 1.0),
-            _ => (2, 23.0, -1.0),
+    isolated(|| {
+        let Some(mut rig) = Rig::new("linuxcnc_block_cycle") else {
+            return;
         };
-        println!(
-            "{}: {:.4} mm, A {:.3} deg, feed {:.4} mm/s",
-            trigger.feature_id,
-            point_mm[axis],
-            trigger.latched[Axis::A].to_degrees(),
-            trigger.feed_mm_s
-        );
-        let depth_mm = (point_mm[axis] - contact_mm) * sign;
-        assert!((0.0..tolerance_mm).contains(&depth_mm), "{trigger:?}");
-        assert!((approach[axis] * sign - 1.0).abs() < 1e-6, "{approach}");
-        assert!((trigger.feed_mm_s - 2.0).abs() < 0.01, "{trigger:?}");
-    }
-    let tilted = rig
-        .triggers
-        .iter()
-        .filter(|t| t.feature_id.contains("tilted"))
-        .count();
-    assert_eq!(tilted, 3);
+        rig.touch(&program());
+        assert_eq!(rig.triggers.len(), 6);
+        // 2 mm/s and at most 6 ms from contact to latch.
+        let tolerance_mm = 0.012;
+        for trigger in &rig.triggers {
+            let point_mm = workpiece_from_machine(trigger.latched.xyz(), trigger.latched[Axis::A]);
+            let approach = workpiece_from_machine(trigger.approach, trigger.latched[Axis::A])
+                - workpiece_from_machine(Vector3::zeros(), trigger.latched[Axis::A]);
+            let (axis, contact_mm, sign) = match &trigger.feature_id[trigger.feature_id.len() - 1..]
+            {
+                "x" => (0, -223.0, 1.0),
+                "y" => (1, -183.0, 1.0),
+                _ => (2, 23.0, -1.0),
+            };
+            println!(
+                "{}: {:.4} mm, A {:.3} deg, feed {:.4} mm/s",
+                trigger.feature_id,
+                point_mm[axis],
+                trigger.latched[Axis::A].to_degrees(),
+                trigger.feed_mm_s
+            );
+            let depth_mm = (point_mm[axis] - contact_mm) * sign;
+            assert!((0.0..tolerance_mm).contains(&depth_mm), "{trigger:?}");
+            assert!((approach[axis] * sign - 1.0).abs() < 1e-6, "{approach}");
+            assert!((trigger.feed_mm_s - 2.0).abs() < 0.01, "{trigger:?}");
+        }
+        let tilted = rig
+            .triggers
+            .iter()
+            .filter(|t| t.feature_id.contains("tilted"))
+            .count();
+        assert_eq!(tilted, 3);
+    });
 }
