@@ -167,9 +167,10 @@ impl Effect for InterpolationError {
         };
         let mut nominal = Follower::new(entry, motion, axis);
         let mut before_mm = first + nominal.error();
+        let mut read_mm = self.read_mm(before_mm);
         let mut misled = Misled {
             follower: Follower::at_rest(entry, if by_scale { 0.0 } else { 1.0 }),
-            command_mm: -self.read_mm(before_mm),
+            command_mm: -read_mm,
         };
         let readings = if by_scale {
             &mut response.scale_reading[axis]
@@ -184,7 +185,8 @@ impl Effect for InterpolationError {
                 nominal.advance(begin, change, step_s);
                 let way_mm = position + nominal.error() - before_mm;
                 let turned_rad = (way_mm * self.rad_per_mm).abs();
-                let to_mm = -self.read_mm(before_mm + way_mm);
+                read_mm = self.read_mm(before_mm + way_mm);
+                let to_mm = -read_mm;
                 // An ideal velocity loop follows its encoder at any speed.
                 if is_rigid || turned_rad <= STEP_RAD {
                     misled.to(to_mm, step_s);
@@ -197,7 +199,7 @@ impl Effect for InterpolationError {
                 before_mm += way_mm;
             }
             *servo += misled.off_mm();
-            *reading += self.read_mm(before_mm);
+            *reading += read_mm;
         }
     }
 }
