@@ -9,7 +9,6 @@
 //! The mean of r repeats has 1/r of the variance of what repeats do not have in common; the error of form they have in common.
 
 use std::ops::Range;
-use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector};
 use twin::effects::{Kind, Parameter, Role};
@@ -20,7 +19,7 @@ use crate::diagnose::stations;
 use crate::error::GapError;
 use crate::noise::form_error::FormError;
 use crate::noise::normal::Normal;
-use crate::noise::stack::{Simulated, Stack};
+use crate::noise::stack::{Shared, Stack};
 use crate::preflight::{AssumedFloor, Floors, assumed};
 use crate::search::resolved;
 use crate::search::rows::{Rows, count};
@@ -100,11 +99,11 @@ pub fn of(
     let zero = session.runs.iter().map(|run| vec![0.0; run.readings.len()]);
     let nothing: Vec<Vec<f64>> = zero.collect();
     let form = FormError::base(order.config);
-    let simulated: Simulated = Rc::default();
+    let shared = Shared::default();
     let of_repeats = |repeats: usize| {
         let noise = assumed(&rows, &quieter(order.floors, repeats));
         let stack = Stack::new(session, twin, &runs, stations, &noise, &form, &nothing);
-        gram(&stack.sharing(&simulated), owns)
+        gram(&stack.sharing(&shared), owns)
     };
     Ok((1..=candidate.most_repeats).map(of_repeats).collect())
 }

@@ -13,6 +13,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
+use metrology::Axis;
 use nalgebra::DVector;
 use twin::effects::Effect;
 use twin::{Channel, Session, Twin};
@@ -23,8 +24,19 @@ use crate::noise::whitener::Whitener;
 use crate::search::nuisance::Nuisance;
 use crate::search::rows::{Block, Rows, count, variances_within};
 
-/// What the twin predicted for the rows of some runs, by effect and the bits of its values.
-pub type Simulated = Rc<RefCell<BTreeMap<(String, Vec<u64>), Rc<[f64]>>>>;
+/// What the twin predicted for rows, by effect and the bits of its values.
+type Simulated = BTreeMap<(String, Vec<u64>), Rc<[f64]>>;
+
+/// What stacks of the same runs share.
+pub type Shared = Rc<Known>;
+
+/// What is computed once for the rows of some runs.
+#[derive(Default)]
+pub struct Known {
+    simulated: RefCell<Simulated>,
+    /// Whether their places along an axis resolve a period, by its bits.
+    resolved: RefCell<BTreeMap<(Axis, u64), bool>>,
+}
 
 /// The rows of some runs with their noise.
 pub struct Stack<'a> {
@@ -50,8 +62,8 @@ pub struct Stack<'a> {
     floats: Vec<Vec<f64>>,
     /// Instants at which the session changed, seconds since its start.
     pub events_s: Rc<[f64]>,
-    /// Predictions that stacks of the same runs share; none are kept where they are not shared.
-    simulated: Option<Simulated>,
+    /// What stacks of the same runs share; nothing is kept where it is not shared.
+    shared: Option<Shared>,
 }
 
 impl<'a> Stack<'a> {
@@ -96,7 +108,7 @@ impl<'a> Stack<'a> {
             unweighted,
             floats: vec![],
             events_s: Rc::from([]),
-            simulated: None,
+            shared: None,
         };
         stack.z = stack.whitened(raw.clone());
         stack.raw = raw;
@@ -137,7 +149,7 @@ impl<'a> Stack<'a> {
             unweighted: self.unweighted.clone(),
             floats: self.floats.clone(),
             events_s: Rc::clone(&self.events_s),
-            simulated: self.simulated.clone(),
+            shared: self.shared.clone(),
             ..*self
         };
         weighed.z = weighed.whitened(weighed.raw.clone());
@@ -165,27 +177,38 @@ impl<'a> Stack<'a> {
         self.whitened(self.simulate(&[effect]))
     }
 
-    /// The same stack, that keeps what it simulates where others of the same runs find it.
-    pub fn sharing(self, simulated: &Simulated) -> Self {
+    /// The same stack, that keeps what it computes where others of the same runs find it.
+    pub fn sharing(self, shared: &Shared) -> Self {
         Self {
-            simulated: Some(Rc::clone(simulated)),
+            shared: Some(Rc::clone(shared)),
             ..self
         }
     }
 
+    /// Whether the places along an axis resolve a period, as `compute` says, which is asked once.
+    pub fn resolves(&self, axis: Axis, period_mm: f64, compute: impl FnOnce() -> bool) -> bool {
+        let Some(shared) = &self.shared else {
+            return compute();
+        };
+        let mut resolved = shared.resolved.borrow_mut();
+        *resolved
+            .entry((axis, period_mm.to_bits()))
+            .or_insert_with(compute)
+    }
+
     /// Signature (2) of the effect of a name at some values, which may be known from another stack of these runs.
     pub fn signature_of(&self, name: &str, values: &[f64], effect: &dyn Effect) -> DVector<f64> {
-        let Some(simulated) = &self.simulated else {
+        let Some(shared) = &self.shared else {
             return self.signature(effect);
         };
         let key = (
             name.to_owned(),
             values.iter().map(|value| value.to_bits()).collect(),
         );
-        let known = simulated.borrow().get(&key).cloned();
+        let known = shared.simulated.borrow().get(&key).cloned();
         let rows = known.unwrap_or_else(|| {
             let rows: Rc<[f64]> = self.simulate(&[effect]).into();
-            simulated.borrow_mut().insert(key, Rc::clone(&rows));
+            shared.simulated.borrow_mut().insert(key, Rc::clone(&rows));
             rows
         });
         self.whitened(rows.to_vec())

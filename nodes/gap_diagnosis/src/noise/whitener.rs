@@ -122,7 +122,20 @@ impl Autoregression {
 
     /// (1), in place.
     pub fn filter(&self, rows: &mut [f64]) {
-        for t in (0..rows.len()).rev() {
+        let order = self.order();
+        let (phi, scatter) = (&self.coefficients[order], self.variances[order].sqrt());
+        for t in (order..rows.len()).rev() {
+            let (before, rest) = rows.split_at_mut(t);
+            let latest_first = before.iter().rev();
+            let told: f64 = phi
+                .iter()
+                .zip(latest_first)
+                .map(|(phi, row)| phi * row)
+                .sum();
+            rest[0] = (rest[0] - told) / scatter;
+        }
+        // The first rows have fewer before them.
+        for t in (0..order.min(rows.len())).rev() {
             let [told, scatter] = self.told(rows, t);
             rows[t] = (rows[t] - told) / scatter;
         }

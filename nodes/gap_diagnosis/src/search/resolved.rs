@@ -58,8 +58,10 @@ pub fn shows(stack: &Stack<'_>, instance: &Instance, values: &[f64]) -> bool {
     let Target::Axis(axis) = instance.target else {
         return true;
     };
-    period_mm(stack, instance, axis, values)
-        .is_none_or(|period_mm| resolves(&places_mm(stack, axis), period_mm))
+    period_mm(stack, instance, axis, values).is_none_or(|period_mm| {
+        let compute = || resolves(&places_mm(stack, axis), period_mm);
+        stack.resolves(axis, period_mm, compute)
+    })
 }
 
 /// Whether an axis was read at some targets only, which resolve no turn of its screw, and nothing but positions along axes was

@@ -14,7 +14,7 @@ use crate::judgement::guard;
 use crate::judgement::unknown::{self, Leftover};
 use crate::noise::Noise;
 use crate::noise::form_error::{self, FormError};
-use crate::noise::stack::{Simulated, Stack};
+use crate::noise::stack::{Shared, Stack};
 use crate::scatter::{self, Scattered};
 use crate::search::families::{self, Slot};
 use crate::search::resolved;
@@ -102,8 +102,8 @@ impl<'a> Base<'a> {
             let form = FormError::beside(&stack, &listed, &nothing, config);
             (Some(listed), form)
         };
-        let simulated = Simulated::default();
-        let stack = self.stack(runs, self.noise, &base).sharing(&simulated);
+        let shared = Shared::default();
+        let stack = self.stack(runs, self.noise, &base).sharing(&shared);
         let first = self.search(stack, self.noise, kinds, config);
         let told = told(&first.stack, first.found.members.iter(), &first.found);
         let rest = less(&first.stack.raw, &told);
@@ -129,7 +129,7 @@ impl<'a> Base<'a> {
             told
         };
         let form = FormError::beside(&first.stack, &listed, &formed, config);
-        let stack = self.stack(runs, &noise, &form).sharing(&simulated);
+        let stack = self.stack(runs, &noise, &form).sharing(&shared);
         let second = self.search(stack, &noise, kinds, config);
         Searched {
             before: first.before,
