@@ -1,6 +1,6 @@
 //! Every message, service and action by its ROS 2 name, with the types that ROS 2 makes of them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Result, bail};
 use ros2msg::msg::{
@@ -122,6 +122,27 @@ impl Interfaces {
             }
         }
         Ok(())
+    }
+
+    /// Refuses other definitions of what is no message by itself: each type that holds it would have another hash too.
+    pub fn check_unreferenced(&self, changed: &BTreeSet<String>) -> Result<()> {
+        for message in self.messages.values() {
+            let mut held = message.spec.fields.iter();
+            let held = held.find_map(|field| {
+                let name = self.nested(message, field)?;
+                changed.contains(&name).then_some(name)
+            });
+            if let Some(name) = held {
+                bail!(
+                    "{} holds {name}, which has two definitions",
+                    message.full_name
+                );
+            }
+        }
+        let other = changed.iter().find(|name| !name.contains("/msg/"));
+        other.map_or(Ok(()), |name| {
+            bail!("{name}: two definitions of a message alone")
+        })
     }
 
     /// Full name of the message that `field` of `owner` holds; `None`: a primitive.

@@ -1,6 +1,6 @@
 //! Writes the Rust types.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use ros2msg::msg::{Annotations, Constant, Field, PrimitiveValue, Value};
@@ -44,6 +44,38 @@ pub fn emit(interfaces: &Interfaces, own_package: &str) -> String {
         );
     }
     out.push_str(&emit_table(interfaces, own_package));
+    out
+}
+
+/// Source text of the messages `names`, in modules of their packages, and a table of them.
+pub fn emit_messages(interfaces: &Interfaces, names: &BTreeSet<String>) -> String {
+    let mut packages: BTreeMap<&str, String> = BTreeMap::new();
+    let mut rows = Vec::new();
+    for message in names.iter().map(|name| &interfaces.messages[name]) {
+        let package = message.full_name.split('/').next().unwrap_or_default();
+        let code = emit_message(interfaces, message, "");
+        packages.entry(package).or_default().push_str(&code);
+        let name = rust_name(&message.full_name);
+        rows.push(format!(
+            "<{package}::msg::{name} as crate::Message>::DESCRIPTION,\n"
+        ));
+    }
+    let mut out = String::new();
+    for (package, code) in packages {
+        put(
+            &mut out,
+            format_args!(
+                "/// Of the ROS 2 package `{package}`.\npub mod {package} {{\n/// Messages.\npub mod msg {{\n{code}}}\n}}\n"
+            ),
+        );
+    }
+    let rows = rows.concat();
+    put(
+        &mut out,
+        format_args!(
+            "/// These messages, sorted by type name.\npub const DESCRIPTIONS: &[crate::Description] = &[\n{rows}];\n"
+        ),
+    );
     out
 }
 

@@ -8,15 +8,16 @@ use crate::interface::{Interfaces, Message};
 use crate::rust_code::literal;
 use crate::type_hash::{FILLER_FIELD, FILLER_TYPE, collect_references, rihs01, type_number};
 
-/// A table of all types, sorted by full name.
-pub fn emit(interfaces: &Interfaces) -> String {
+/// A table of the types that `is_wanted` picks by full name, sorted by it.
+pub fn emit(interfaces: &Interfaces, is_wanted: impl Fn(&str) -> bool) -> String {
     let rows: String = interfaces
         .messages
         .values()
+        .filter(|message| is_wanted(&message.full_name))
         .map(|message| row(interfaces, message))
         .collect();
     format!(
-        "/// Every type by its parts, sorted by type name.\npub const TYPE_PARTS: &[crate::TypeParts] = &[\n{rows}];\n"
+        "/// Types by their parts, sorted by type name.\npub const TYPE_PARTS: &[crate::TypeParts] = &[\n{rows}];\n"
     )
 }
 

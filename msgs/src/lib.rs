@@ -25,6 +25,7 @@ mod geometry;
 mod interface;
 mod motion;
 mod qos;
+mod release;
 mod report;
 mod segment;
 mod sensor;
@@ -46,6 +47,7 @@ pub use interface::{
 };
 pub use motion::joint_state;
 pub use qos::{Durability, Qos, Reliability};
+pub use release::{Conversion, Release};
 pub use service_event::{SERVICE_EVENT_SUFFIX, ServiceEvent};
 pub use wire::{Wire, instant, time};
 

@@ -93,6 +93,7 @@ decoders![
     abbe_msgs::lifecycle_msgs::msg::Transition,
     abbe_msgs::lifecycle_msgs::msg::TransitionDescription,
     abbe_msgs::lifecycle_msgs::msg::TransitionEvent,
+    abbe_msgs::lyrical::lifecycle_msgs::msg::TransitionEvent,
     abbe_msgs::lifecycle_msgs::srv::ChangeStateRequest,
     abbe_msgs::lifecycle_msgs::srv::ChangeStateResponse,
     abbe_msgs::lifecycle_msgs::srv::GetAvailableStatesRequest,

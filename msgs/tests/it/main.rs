@@ -7,6 +7,7 @@ mod geometry;
 mod interface_files;
 mod machine_value;
 mod refusals;
+mod release;
 mod topics;
 mod type_hashes;
 mod wire;
