@@ -115,6 +115,7 @@ fn on_loopback(program: &Path, domain: u16, arguments: &[&str]) -> Command {
         .env("ROS_DOMAIN_ID", domain.to_string())
         .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         .env_remove("ROS_LOCALHOST_ONLY")
+        .env_remove("ROS_DISTRO")
         .env_remove("RUST_LOG")
         .stdin(Stdio::null())
         .stdout(Stdio::piped())

@@ -6,8 +6,12 @@
 
 use std::net::Ipv4Addr;
 
+use abbe_msgs::Release;
+
+mod distribution;
 mod security;
 
+pub(crate) use distribution::release;
 pub(crate) use security::ENCLAVE;
 pub use security::{FILES as ENCLAVE_FILES, NoCredentials, Security, is_enclave};
 
@@ -68,6 +72,10 @@ pub struct Environment {
     pub range: DiscoveryRange,
     /// `ROS_STATIC_PEERS`: IPv4 addresses or names of hosts.
     pub static_peers: Vec<String>,
+    /// `ROS_DISTRO`: whose definitions of ROS's own messages the graph uses.
+    pub release: Release,
+    /// The value of `ROS_DISTRO` where it is no name that is known.
+    pub unknown_distribution: Option<String>,
     /// `RUST_LOG`.
     pub log_filter: Option<String>,
 }
@@ -204,9 +212,13 @@ impl Environment {
         if security.is_some() && middleware == Middleware::Zenoh {
             return Err(EnvironmentError::SecurityOfZenoh);
         }
+        let distribution = set("ROS_DISTRO");
+        let known = release(distribution.as_deref());
         Ok(Self {
             middleware,
             zenoh,
+            release: known.unwrap_or(Release::Lyrical),
+            unknown_distribution: distribution.filter(|_| known.is_none()),
             domain_id,
             security,
             range,

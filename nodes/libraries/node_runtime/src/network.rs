@@ -4,13 +4,13 @@
 //! The middleware is chosen when a node joins ([`Environment::middleware`]) and known nowhere above this
 //! module.
 
-use abbe_msgs::Qos;
+use abbe_msgs::{Conversion, Qos, Release};
 use metrology::Stamp;
 use metrology::stamp::Host;
 
 use crate::dds;
 use crate::environment::{Environment, Middleware};
-use crate::names::NodeNames;
+use crate::names::{self, NodeNames};
 use crate::node::Bytes;
 #[cfg(feature = "zenoh")]
 use crate::zenoh;
@@ -107,7 +107,13 @@ impl Remote {
 }
 
 /// A node's place on the network.
-pub(crate) enum Participant {
+pub(crate) struct Participant {
+    place: Place,
+    release: Release,
+}
+
+/// The same by middleware.
+enum Place {
     Dds(Box<dds::Participant>),
     #[cfg(feature = "zenoh")]
     Zenoh(zenoh::Participant),
@@ -131,78 +137,119 @@ impl Participant {
         environment: &Environment,
         names: &NodeNames,
     ) -> anyhow::Result<(Self, Option<String>)> {
-        match environment.middleware {
+        let (place, warning) = match environment.middleware {
             Middleware::Dds => {
                 let (joined, warning) = dds::Participant::join(environment, names)?;
-                Ok((Self::Dds(Box::new(joined)), warning))
+                (Place::Dds(Box::new(joined)), warning)
             }
             #[cfg(feature = "zenoh")]
             Middleware::Zenoh => {
                 let (joined, warning) = zenoh::Participant::join(environment, names)?;
-                Ok((Self::Zenoh(joined), warning))
+                (Place::Zenoh(joined), warning)
             }
             #[cfg(not(feature = "zenoh"))]
-            Middleware::Zenoh => Err(crate::environment::EnvironmentError::NoZenoh.into()),
-        }
+            Middleware::Zenoh => return Err(crate::environment::EnvironmentError::NoZenoh.into()),
+        };
+        let release = environment.release;
+        let warnings = warning
+            .into_iter()
+            .chain(environment.distribution_warning());
+        let warnings: Vec<String> = warnings.collect();
+        let warning = (!warnings.is_empty()).then(|| warnings.join("; "));
+        Ok((Self { place, release }, warning))
+    }
+
+    /// Whose definitions of ROS's own messages the graph uses.
+    pub const fn release(&self) -> Release {
+        self.release
+    }
+
+    /// The hash by which the graph knows a type of ours, in its form on the wire; `None`: it is none of ours.
+    pub fn own_hash(&self, dds_type: &str) -> Option<&'static str> {
+        own_hash(self.release, dds_type)
     }
 
     /// Lets writers that are made from now on wait while the way out is full, instead of dropping: for
     /// who speaks from a thread of its own. On DDS nothing changes: there the caller waits for
     /// acknowledgements.
     pub fn wait_for_room(&mut self) {
-        match self {
-            Self::Dds(_) => {}
+        match &mut self.place {
+            Place::Dds(_) => {}
             #[cfg(feature = "zenoh")]
-            Self::Zenoh(participant) => participant.wait_for_room(),
+            Place::Zenoh(participant) => participant.wait_for_room(),
         }
     }
 
-    /// A writer of serialised samples.
+    /// A writer of serialised samples by our definition of their type.
     pub fn writer(&self, topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Writer> {
-        Ok(match self {
-            Self::Dds(participant) => Writer::Dds(participant.writer(topic, dds_type, qos)?),
+        let ours = own_hash(Release::default(), dds_type);
+        self.writer_of(topic, (dds_type, ours), qos)
+    }
+
+    /// A writer of serialised samples by the definition with a hash; they leave by that of the graph, where it is known.
+    pub fn writer_of(
+        &self,
+        topic: &str,
+        (dds_type, hash): (&str, Option<&str>),
+        qos: Qos,
+    ) -> anyhow::Result<Writer> {
+        let end = match &self.place {
+            Place::Dds(participant) => WriterEnd::Dds(participant.writer(topic, dds_type, qos)?),
             #[cfg(feature = "zenoh")]
-            Self::Zenoh(participant) => Writer::Zenoh(participant.writer(topic, dds_type, qos)?),
-        })
+            Place::Zenoh(participant) => {
+                WriterEnd::Zenoh(participant.writer(topic, dds_type, qos)?)
+            }
+        };
+        let type_name = names::ros_type(dds_type);
+        let conversion = type_name
+            .zip(hash)
+            .and_then(|(name, hash)| self.release.conversion(&name, hash));
+        Ok(Writer { end, conversion })
     }
 
     /// A reader of serialised samples.
     pub fn reader(&self, topic: &str, dds_type: &str, qos: Qos) -> anyhow::Result<Reader> {
-        Ok(match self {
-            Self::Dds(participant) => {
+        Ok(match &self.place {
+            Place::Dds(participant) => {
                 Reader::Dds(Box::new(participant.reader(topic, dds_type, qos)?))
             }
             #[cfg(feature = "zenoh")]
-            Self::Zenoh(participant) => Reader::Zenoh(participant.reader(topic, dds_type, qos)?),
+            Place::Zenoh(participant) => Reader::Zenoh(participant.reader(topic, dds_type, qos)?),
         })
     }
 
     /// Both ends of a service's server, for a type `pkg/srv/Name`: of requests, of replies.
     pub fn server(&self, service: &str, type_name: &str) -> anyhow::Result<(Reader, Writer)> {
-        Ok(match self {
-            Self::Dds(participant) => {
+        Ok(match &self.place {
+            Place::Dds(participant) => {
                 let (reader, writer) = participant.server(service, type_name)?;
-                (Reader::Dds(Box::new(reader)), Writer::Dds(writer))
+                (
+                    Reader::Dds(Box::new(reader)),
+                    Writer::of(WriterEnd::Dds(writer)),
+                )
             }
             #[cfg(feature = "zenoh")]
-            Self::Zenoh(participant) => {
+            Place::Zenoh(participant) => {
                 let (reader, writer) = participant.server(service, type_name)?;
-                (Reader::Zenoh(reader), Writer::Zenoh(writer))
+                (Reader::Zenoh(reader), Writer::of(WriterEnd::Zenoh(writer)))
             }
         })
     }
 
     /// Both ends of a service's client: of replies, of requests.
     pub fn client(&self, service: &str, type_name: &str) -> anyhow::Result<(Reader, Writer)> {
-        Ok(match self {
-            Self::Dds(participant) => {
+        Ok(match &self.place {
+            Place::Dds(participant) => {
                 let (reader, writer) = participant.client(service, type_name)?;
-                (Reader::Dds(Box::new(reader)), Writer::Dds(writer))
+                (
+                    Reader::Dds(Box::new(reader)),
+                    Writer::of(WriterEnd::Dds(writer)),
+                )
             }
             #[cfg(feature = "zenoh")]
-            Self::Zenoh(participant) => {
+            Place::Zenoh(participant) => {
                 let (reader, writer) = participant.client(service, type_name)?;
-                (Reader::Zenoh(reader), Writer::Zenoh(writer))
+                (Reader::Zenoh(reader), Writer::of(WriterEnd::Zenoh(writer)))
             }
         })
     }
@@ -210,8 +257,8 @@ impl Participant {
     /// Whether a writer's answers reach the participant that an endpoint is of. Zenoh's go back the way of their
     /// question.
     pub fn reaches(&self, writer: &Writer, other: &Guid) -> bool {
-        match (self, writer) {
-            (Self::Dds(participant), Writer::Dds(writer)) => participant.reaches(writer, other),
+        match (&self.place, &writer.end) {
+            (Place::Dds(participant), WriterEnd::Dds(writer)) => participant.reaches(writer, other),
             #[cfg(feature = "zenoh")]
             _ => true,
         }
@@ -219,46 +266,52 @@ impl Participant {
 
     /// What is not heard once the clock was set back, until it shows again what it showed before.
     pub fn unheard_after_set_back(&self) -> Option<&'static str> {
-        match self {
-            Self::Dds(_) => Some("samples of best effort and nodes that are new"),
+        match &self.place {
+            Place::Dds(_) => Some("samples of best effort and nodes that are new"),
             #[cfg(feature = "zenoh")]
-            Self::Zenoh(_) => None,
+            Place::Zenoh(_) => None,
         }
     }
 
     /// Shows the node with all its endpoints on the ROS graph.
     pub fn announce(&self) -> anyhow::Result<()> {
-        either!(Self, self, participant => participant.announce())
+        either!(Place, &self.place, participant => participant.announce())
     }
 
     /// Takes the node off the ROS graph.
     pub fn withdraw(&self) -> anyhow::Result<()> {
-        either!(Self, self, participant => participant.withdraw())
+        either!(Place, &self.place, participant => participant.withdraw())
     }
 
     /// Waits until everybody has the last news of the graph, as far as the middleware can tell.
     pub async fn graph_acknowledged(&self) {
-        match self {
-            Self::Dds(participant) => participant.graph_acknowledged().await,
+        match &self.place {
+            Place::Dds(participant) => participant.graph_acknowledged().await,
             #[cfg(feature = "zenoh")]
-            Self::Zenoh(_) => {}
+            Place::Zenoh(_) => {}
         }
     }
 
     /// Whether somebody else has announced a node of our name.
     pub fn namesake(&self) -> bool {
-        either!(Self, self, participant => participant.namesake())
+        either!(Place, &self.place, participant => participant.namesake())
     }
 
     /// Everybody's writers, ours included.
     pub fn writers(&self) -> Vec<Remote> {
-        either!(Self, self, participant => participant.writers())
+        either!(Place, &self.place, participant => participant.writers())
     }
 
     /// Everybody's readers, ours included.
     pub fn readers(&self) -> Vec<Remote> {
-        either!(Self, self, participant => participant.readers())
+        either!(Place, &self.place, participant => participant.readers())
     }
+}
+
+/// The hash of a type of ours by the definitions of a release.
+pub(crate) fn own_hash(release: Release, dds_type: &str) -> Option<&'static str> {
+    let type_name = names::ros_type(dds_type)?;
+    release.parts_of(&type_name).map(|parts| parts.type_hash)
 }
 
 /// Reads one topic, or the requests or replies of one service.
@@ -277,47 +330,65 @@ impl Reader {
 
 /// Writes one topic, or the requests or replies of one service. Writing never waits, unless
 /// [`Participant::wait_for_room`] was asked for.
-pub(crate) enum Writer {
+pub(crate) struct Writer {
+    end: WriterEnd,
+    /// Where the graph has another definition of the samples' type.
+    conversion: Option<Conversion>,
+}
+
+/// The same by middleware.
+enum WriterEnd {
     Dds(dds::Writer),
     #[cfg(feature = "zenoh")]
     Zenoh(zenoh::Writer),
 }
 
 impl Writer {
+    const fn of(end: WriterEnd) -> Self {
+        Self {
+            end,
+            conversion: None,
+        }
+    }
+
     pub fn guid(&self) -> Guid {
-        either!(Self, self, writer => writer.guid())
+        either!(WriterEnd, &self.end, writer => writer.guid())
     }
 
     /// Whether the other end speaks Cyclone DDS's mapping of services.
     pub fn meets_cyclone(&self, other: &Guid) -> bool {
-        match self {
-            Self::Dds(_) => dds::is_cyclone(other),
+        match &self.end {
+            WriterEnd::Dds(_) => dds::is_cyclone(other),
             #[cfg(feature = "zenoh")]
-            Self::Zenoh(_) => false,
+            WriterEnd::Zenoh(_) => false,
         }
     }
 
     /// Sends a sample; `source` is its own time where it has one, else the present.
     pub fn publish(&self, bytes: &Bytes, source: Option<Stamp<Host>>) -> Result<(), PublishError> {
-        either!(Self, self, writer => writer.publish(bytes, source))
+        let converted = self.conversion.map(|convert| convert(bytes)).transpose();
+        let converted = converted.map_err(|error| PublishError::Broken(error.to_string()))?;
+        let converted: Option<Bytes> = converted.map(Bytes::from);
+        let bytes = converted.as_ref().unwrap_or(bytes);
+        either!(WriterEnd, &self.end, writer => writer.publish(bytes, source))
     }
 
     /// Sends a reply.
     pub fn reply(&self, bytes: &Bytes, to: RequestIdentity) -> Result<(), PublishError> {
-        either!(Self, self, writer => writer.reply(bytes, to))
+        either!(WriterEnd, &self.end, writer => writer.reply(bytes, to))
     }
 
     /// Sends a request and says under which identity the reply will come.
     pub fn request(&self, bytes: &Bytes) -> Result<RequestIdentity, PublishError> {
-        either!(Self, self, writer => writer.request(bytes))
+        either!(WriterEnd, &self.end, writer => writer.request(bytes))
     }
 
     /// Waits until every reliable reader has everything that was sent; Zenoh cannot tell.
     pub async fn acknowledged(&self) {
-        match self {
-            Self::Dds(writer) => writer.acknowledged().await,
+        match &self.end {
+            WriterEnd::Dds(writer) => writer.acknowledged().await,
             #[cfg(feature = "zenoh")]
-            Self::Zenoh(_) => {}
+            WriterEnd::Zenoh(_) => {}
         }
     }
 }

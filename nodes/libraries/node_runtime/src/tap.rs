@@ -35,6 +35,8 @@ pub struct TappedTopic {
     pub name: String,
     /// Type, e.g. `abbe_msgs/msg/AxisState`.
     pub type_name: String,
+    /// RIHS01 hash of its definition; `None`: neither announced nor one of ours.
+    pub type_hash: Option<String>,
     /// What its writers offer; the depth is the tap's own.
     pub qos: Qos,
 }
@@ -275,13 +277,7 @@ async fn look(
                 let Ok(reader) = participant.reader(&name, &first.dds_type, qos) else {
                     continue;
                 };
-                let type_name =
-                    names::ros_type(&first.dds_type).unwrap_or_else(|| first.dds_type.clone());
-                let topic = Arc::new(TappedTopic {
-                    name: name.clone(),
-                    type_name,
-                    qos,
-                });
+                let topic = Arc::new(tapped(&participant, &name, &writers, qos));
                 let _ = participant.announce();
                 if queue
                     .send(TapEvent::Found(Arc::clone(&topic)))
@@ -324,6 +320,19 @@ async fn tell_unmatched(patterns: Vec<String>, queue: &mpsc::Sender<TapEvent>) {
     for pattern in patterns {
         // Who listened may have gone.
         let _ = queue.send(TapEvent::Unmatched { pattern }).await;
+    }
+}
+
+/// A topic as its first writer describes it; the hash is what a writer of its type announced, else our own.
+fn tapped(participant: &Participant, name: &str, writers: &[&Remote], qos: Qos) -> TappedTopic {
+    let dds_type = writers.first().map_or("", |first| first.dds_type.as_str());
+    let mut alike = writers.iter().filter(|it| it.dds_type == dds_type);
+    let announced = alike.find_map(|writer| writer.type_hash.clone());
+    TappedTopic {
+        name: name.to_owned(),
+        type_name: names::ros_type(dds_type).unwrap_or_else(|| dds_type.to_owned()),
+        type_hash: announced.or_else(|| participant.own_hash(dds_type).map(str::to_owned)),
+        qos,
     }
 }
 

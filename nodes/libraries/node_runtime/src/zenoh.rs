@@ -10,12 +10,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use ::zenoh::Wait as _;
 use ::zenoh::liveliness::LivelinessToken;
-use abbe_msgs::{Qos, parts_of};
+use abbe_msgs::{Qos, Release};
 use anyhow::anyhow;
 
 use crate::environment::Environment;
 use crate::names::{self, NodeNames};
-use crate::network::{Remote, Role};
+use crate::network::{Remote, Role, own_hash};
 
 mod attachment;
 mod endpoint;
@@ -60,6 +60,7 @@ pub(crate) struct Participant {
     next_end: AtomicU64,
     tokens: Mutex<Tokens>,
     waits_for_room: bool,
+    release: Release,
 }
 
 impl Participant {
@@ -87,6 +88,7 @@ impl Participant {
             next_end: AtomicU64::new(0),
             tokens: Mutex::new(tokens),
             waits_for_room: false,
+            release: environment.release,
         };
         Ok((joined, warning))
     }
@@ -97,9 +99,8 @@ impl Participant {
 
     /// The hash of a type: ours, else as somebody on the network tells it.
     fn hash(&self, name: &str, dds_type: &str) -> Option<String> {
-        let known = names::ros_type(dds_type).and_then(|ros_type| parts_of(&ros_type));
-        match known {
-            Some(parts) => Some(parts.type_hash.to_owned()),
+        match own_hash(self.release, dds_type) {
+            Some(hash) => Some(hash.to_owned()),
             None => self.shared.graph.hash_of(name, dds_type),
         }
     }

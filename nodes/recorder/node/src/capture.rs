@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use abbe_msgs::{Qos, description_of, topics};
+use abbe_msgs::{Description, Qos, Release, description_of, topics};
 use anyhow::Result;
 use node_runtime::HostTime;
 use node_runtime::environment::Environment;
@@ -91,17 +91,30 @@ fn offered(topic: &TappedTopic) -> Qos {
     }
 }
 
+/// Our description of a topic's type; `None`: its name is unknown, or its writers announced another definition.
+fn description(topic: &TappedTopic) -> Option<&'static Description> {
+    let Some(hash) = &topic.type_hash else {
+        return description_of(&topic.type_name);
+    };
+    let mut releases = Release::ALL.into_iter();
+    releases.find_map(|release| {
+        let known = release.description_of(&topic.type_name)?;
+        (known.type_hash == hash).then_some(known)
+    })
+}
+
 /// The topic as a bag holds it; `None`: hidden and of an unknown type, which no reader could decode.
 fn channel(topic: &TappedTopic) -> Option<Channel> {
-    let known = description_of(&topic.type_name);
+    let known = description(topic);
     if known.is_none() && topic.name.contains("/_") {
         return None;
     }
     let text = |text: Option<&str>| text.unwrap_or_default().to_owned();
+    let own = known.map(|known| known.type_hash);
     Some(Channel {
         topic: topic.name.clone(),
         type_name: topic.type_name.clone(),
-        type_hash: text(known.map(|known| known.type_hash)),
+        type_hash: text(topic.type_hash.as_deref().or(own)),
         definition: text(known.map(|known| known.definition)),
         qos_yaml: offered(topic).offered_qos_profiles(),
     })
@@ -287,6 +300,7 @@ mod tests {
         TappedTopic {
             name: name.to_owned(),
             type_name: type_name.to_owned(),
+            type_hash: None,
             qos: Qos {
                 depth: 20_000,
                 ..Qos::RELIABLE
@@ -310,6 +324,35 @@ mod tests {
         assert_eq!(
             channel(&found("/a/_action/x", "other_msgs/action/X_F")),
             None
+        );
+    }
+
+    #[test]
+    fn a_topic_has_the_definition_that_its_writers_announced() {
+        let event = "lifecycle_msgs/msg/TransitionEvent";
+        for release in Release::ALL {
+            let own = release.description_of(event).unwrap();
+            let topic = TappedTopic {
+                type_hash: Some(own.type_hash.to_owned()),
+                ..found("/probe/transition_event", event)
+            };
+            let channel = channel(&topic).unwrap();
+            assert_eq!(channel.type_hash, own.type_hash);
+            assert_eq!(channel.definition, own.definition);
+        }
+    }
+
+    #[test]
+    fn another_version_of_a_known_type_is_recorded_with_its_hash_and_without_our_definition() {
+        let hash = format!("RIHS01_{}", "1".repeat(64));
+        let topic = TappedTopic {
+            type_hash: Some(hash.clone()),
+            ..found("/probe/point", "abbe_msgs/msg/ProbedPoint")
+        };
+        let channel = channel(&topic).unwrap();
+        assert_eq!(
+            (channel.type_hash, channel.definition),
+            (hash, String::new())
         );
     }
 }

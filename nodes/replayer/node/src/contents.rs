@@ -90,6 +90,7 @@ impl Contents {
                     offered.push(TappedTopic {
                         name: info.topic.clone(),
                         type_name: info.type_name.clone(),
+                        type_hash: Some(info.type_hash.clone()).filter(|hash| !hash.is_empty()),
                         qos,
                     });
                     Plan::Play(offered.len() - 1)
@@ -116,6 +117,7 @@ impl Contents {
             offered.push(TappedTopic {
                 name: topics::CLOCK.name.to_owned(),
                 type_name: "rosgraph_msgs/msg/Clock".to_owned(),
+                type_hash: None,
                 qos: topics::CLOCK.qos,
             });
             offered.len() - 1

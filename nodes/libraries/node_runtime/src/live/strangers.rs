@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use abbe_msgs::builtin_interfaces::msg::Time;
-use abbe_msgs::from_cdr;
+use abbe_msgs::{Release, from_cdr};
 use metrology::Stamp;
 
 use super::action_client::ActionClient;
@@ -88,7 +88,7 @@ fn serve(to: ReplyTo, request: &Bytes) {
     for (service, ..) in LoggerService::ALL {
         let _ = service.answer("/node", request);
     }
-    let _ = type_description::answer(request);
+    let _ = type_description::answer(Release::default(), request);
 }
 
 /// As an answer to each question of an action's client, and as news of its goal.

@@ -8,7 +8,7 @@ use abbe_msgs::type_description_interfaces::msg::{
 use abbe_msgs::type_description_interfaces::srv::{
     GetTypeDescription, GetTypeDescriptionRequest, GetTypeDescriptionResponse,
 };
-use abbe_msgs::{Service, TypeParts, WireError, from_cdr, parts_of, to_cdr};
+use abbe_msgs::{Release, Service, TypeParts, WireError, from_cdr, to_cdr};
 
 use super::service::shared;
 use crate::node::Bytes;
@@ -17,14 +17,14 @@ use crate::node::Bytes;
 pub(super) const TYPE_SERVICE: (&str, &str) =
     ("~/get_type_description", GetTypeDescription::TYPE_NAME);
 
-/// The answer to a request.
+/// The answer to a request, by the definitions of a release.
 ///
 /// # Errors
 /// When the request is malformed.
-pub(super) fn answer(bytes: &[u8]) -> Result<Bytes, WireError> {
+pub(super) fn answer(release: Release, bytes: &[u8]) -> Result<Bytes, WireError> {
     let request: GetTypeDescriptionRequest = from_cdr(bytes)?;
-    let response = match found(&request) {
-        Ok(parts) => described(parts, request.include_type_sources),
+    let response = match found(release, &request) {
+        Ok(parts) => described(release, parts, request.include_type_sources),
         Err(failure_reason) => GetTypeDescriptionResponse {
             failure_reason,
             ..Default::default()
@@ -33,14 +33,18 @@ pub(super) fn answer(bytes: &[u8]) -> Result<Bytes, WireError> {
     Ok(shared(&to_cdr(&response)))
 }
 
-fn found(request: &GetTypeDescriptionRequest) -> Result<&'static TypeParts, String> {
+fn found(
+    release: Release,
+    request: &GetTypeDescriptionRequest,
+) -> Result<&'static TypeParts, String> {
     let GetTypeDescriptionRequest {
         type_name,
         type_hash,
         ..
     } = request;
-    let parts =
-        parts_of(type_name).ok_or_else(|| format!("type `{type_name}` is not known here"))?;
+    let parts = release
+        .parts_of(type_name)
+        .ok_or_else(|| format!("type `{type_name}` is not known here"))?;
     // An empty hash asks for the type by its name alone.
     if type_hash.is_empty() || type_hash == parts.type_hash {
         Ok(parts)
@@ -52,11 +56,15 @@ fn found(request: &GetTypeDescriptionRequest) -> Result<&'static TypeParts, Stri
     }
 }
 
-fn described(parts: &TypeParts, with_sources: bool) -> GetTypeDescriptionResponse {
+fn described(
+    release: Release,
+    parts: &TypeParts,
+    with_sources: bool,
+) -> GetTypeDescriptionResponse {
     let referenced: Vec<_> = parts
         .referenced
         .iter()
-        .filter_map(|n| parts_of(n))
+        .filter_map(|name| release.parts_of(name))
         .collect();
     let type_description = TypeDescription {
         type_description: individual(parts),
@@ -114,7 +122,26 @@ mod tests {
             type_hash: type_hash.to_owned(),
             include_type_sources: sources,
         });
-        from_cdr(&answer(&request).unwrap()).unwrap()
+        from_cdr(&answer(Release::Jazzy, &request).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_message_of_two_definitions_is_described_by_that_of_the_graph() {
+        for (release, field) in [(Release::Jazzy, "timestamp"), (Release::Lyrical, "stamp")] {
+            let type_name = "lifecycle_msgs/msg/TransitionEvent".to_owned();
+            let own = release.parts_of(&type_name).unwrap();
+            let request = to_cdr(&GetTypeDescriptionRequest {
+                type_name,
+                type_hash: own.type_hash.to_owned(),
+                include_type_sources: true,
+            });
+            let bytes = answer(release, &request).unwrap();
+            let response: GetTypeDescriptionResponse = from_cdr(&bytes).unwrap();
+            assert!(response.successful, "{}", response.failure_reason);
+            let fields = &response.type_description.type_description.fields;
+            assert_eq!(fields[0].name, field);
+            assert!(response.type_sources[0].raw_file_contents.contains(field));
+        }
     }
 
     #[test]

@@ -302,6 +302,7 @@ mod tests {
             let topic = Arc::new(TappedTopic {
                 name: "/t".to_owned(),
                 type_name: "t".to_owned(),
+                type_hash: None,
                 qos: Qos::RELIABLE,
             });
             let (queue, mut events) = mpsc::channel(100_000);

@@ -156,6 +156,7 @@ impl RawPublisher {
             .map(|port| TappedTopic {
                 name: port.topic.clone(),
                 type_name: port.type_name.to_owned(),
+                type_hash: Some(port.type_hash.to_owned()),
                 qos: port.qos,
             })
             .collect();
@@ -220,7 +221,8 @@ impl RawPublisher {
         let mut writers = Vec::with_capacity(planned.len());
         let mut own = Vec::with_capacity(planned.len());
         for (mut end, qos) in planned {
-            let writer = participant.writer(&end.name, &end.dds_type, qos)?;
+            let definition = (end.dds_type.as_str(), end.type_hash.as_deref());
+            let writer = participant.writer_of(&end.name, definition, qos)?;
             end.guid = writer.guid();
             own.push(end);
             writers.push(writer);
@@ -352,7 +354,7 @@ fn planned(names: &NodeNames, topics: &[TappedTopic]) -> anyhow::Result<Vec<(Rem
             role: Role::Message,
             name: names.resolve(&topic.name)?,
             dds_type: names::dds_type(&topic.type_name),
-            type_hash: None,
+            type_hash: topic.type_hash.clone(),
             reliable: topic.qos.reliability == Reliability::Reliable,
             latched: topic.qos.durability == Durability::TransientLocal,
         };

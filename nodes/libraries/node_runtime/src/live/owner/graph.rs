@@ -3,13 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use abbe_msgs::{Durability, Qos, Reliability, parts_of};
+use abbe_msgs::{Durability, Qos, Release, Reliability};
 use tokio::time::Instant;
 
 use super::{Owner, now};
 use crate::diagnostic::{Diagnostic, Level};
 use crate::names;
-use crate::network::{Guid, Remote, Role};
+use crate::network::{Guid, Remote, Role, own_hash};
 
 /// Who writes on a topic that is read.
 #[derive(Debug, Default)]
@@ -31,6 +31,7 @@ struct End<'o> {
     dds_type: &'o str,
     qos: Qos,
     is_reader: bool,
+    release: Release,
 }
 
 impl End<'_> {
@@ -44,8 +45,7 @@ impl End<'_> {
             |dds_type: &str| names::ros_type(dds_type).unwrap_or_else(|| dds_type.to_owned());
         // RustDDS matches by topic name alone, so that samples of another type would be decoded; Zenoh by
         // name, type and hash, so that they would be missed in silence.
-        let own_hash = names::ros_type(self.dds_type).and_then(|name| parts_of(&name));
-        let own_hash = own_hash.map(|parts| parts.type_hash);
+        let own_hash = own_hash(self.release, self.dds_type);
         let by = if other.node.is_empty() {
             String::new()
         } else {
@@ -58,8 +58,9 @@ impl End<'_> {
                 shown(&other.dds_type)
             )),
             (Some(found), Some(expected)) if found != expected => Some(format!(
-                "{topic}: {} has the hash {expected} here, {found} there{by}",
-                shown(self.dds_type)
+                "{topic}: {} has the hash {expected} here, {found} there{by}{}",
+                shown(self.dds_type),
+                self.remedy(found)
             )),
             _ => None,
         };
@@ -79,6 +80,18 @@ impl End<'_> {
             of_type,
             of_qos.map(|complaint| format!("{topic}: {complaint}")),
         )
+    }
+}
+
+impl End<'_> {
+    /// What to do where another release of ROS has the definition with this hash.
+    fn remedy(&self, hash: &str) -> &'static str {
+        let mut releases = Release::ALL.into_iter();
+        match releases.find(|release| own_hash(*release, self.dds_type) == Some(hash)) {
+            Some(Release::Jazzy) => "; set ROS_DISTRO=jazzy for all nodes, or for none",
+            Some(Release::Lyrical) => "; set ROS_DISTRO=lyrical",
+            None => "",
+        }
     }
 }
 
@@ -104,12 +117,14 @@ impl Owner {
 
     /// Keeps which writers of a topic that is read are of its type.
     fn meet(&mut self, place: usize, writers: &[Remote]) {
+        let release = self.participant.release();
         let subscription = &mut self.subscriptions[place];
         let end = End {
             topic: &subscription.topic,
             dds_type: &subscription.dds_type,
             qos: subscription.qos,
             is_reader: true,
+            release,
         };
         let (mut ours, mut foreign) = (BTreeSet::new(), BTreeMap::new());
         for writer in writers
@@ -135,17 +150,20 @@ impl Owner {
         for place in 0..self.subscriptions.len() {
             self.meet(place, &writers);
         }
+        let release = self.participant.release();
         let subscriptions = self.subscriptions.iter().map(|subscription| End {
             topic: &subscription.topic,
             dds_type: &subscription.dds_type,
             qos: subscription.qos,
             is_reader: true,
+            release,
         });
         let publications = self.publications.iter().map(|publication| End {
             topic: &publication.topic,
             dds_type: &publication.dds_type,
             qos: publication.qos,
             is_reader: false,
+            release,
         });
         let (mut of_type, mut of_qos) = (Vec::new(), Vec::new());
         for end in subscriptions.chain(publications) {
@@ -210,6 +228,7 @@ mod tests {
             dds_type: "abbe_msgs::msg::dds_::ProbeLatency_",
             qos: Qos::LATCHED,
             is_reader: true,
+            release: Release::Jazzy,
         };
         let mut other = Remote {
             guid: [0; 16],
@@ -247,5 +266,40 @@ mod tests {
         );
         other.name = "/other".to_owned();
         assert_eq!(offering.complaints(&other), (None, None));
+    }
+
+    #[test]
+    fn a_definition_of_another_release_is_named_with_its_remedy() {
+        let dds_type = names::dds_type("lifecycle_msgs/msg/TransitionEvent");
+        for (here, there, remedy) in [
+            (Release::Jazzy, Release::Lyrical, "; set ROS_DISTRO=lyrical"),
+            (
+                Release::Lyrical,
+                Release::Jazzy,
+                "; set ROS_DISTRO=jazzy for all nodes, or for none",
+            ),
+        ] {
+            let end = End {
+                topic: "/probe/transition_event",
+                dds_type: &dds_type,
+                qos: Qos::RELIABLE,
+                is_reader: false,
+                release: here,
+            };
+            let mut other = Remote {
+                guid: [0; 16],
+                node: String::new(),
+                role: Role::Message,
+                name: end.topic.to_owned(),
+                dds_type: dds_type.clone(),
+                type_hash: own_hash(there, &dds_type).map(str::to_owned),
+                reliable: true,
+                latched: false,
+            };
+            let of_hash = end.complaints(&other).0.unwrap();
+            assert!(of_hash.ends_with(remedy), "{of_hash}");
+            other.type_hash = own_hash(here, &dds_type).map(str::to_owned);
+            assert_eq!(end.complaints(&other), (None, None));
+        }
     }
 }

@@ -183,7 +183,8 @@ impl Owner {
                 self.answer_or_complain(place, to, answer);
             }
             ServerUse::TypeDescription => {
-                self.answer_or_complain(place, to, type_description::answer(bytes));
+                let answer = type_description::answer(self.participant.release(), bytes);
+                self.answer_or_complain(place, to, answer);
             }
             ServerUse::Action(action, service) => self.goal_request(action, service, to, bytes),
         }
