@@ -332,9 +332,10 @@ pub fn mapping(data: &[u8]) {
     }
 }
 
-/// A datagram that somebody sends to where participants announce themselves.
+/// A datagram that somebody sends to where participants announce themselves, and what an endpoint says of its type.
 pub fn rtps(data: &[u8]) {
     strangers::datagram(data);
+    strangers::user_data(data);
 }
 
 /// The text as what somebody calls a topic, and as a key of Zenoh's graph.

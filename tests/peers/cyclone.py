@@ -2,7 +2,8 @@
 
     cyclone.py '{"domain": 42, "readers": [...], "writers": [...]}'
 
-A reader or writer is {"topic", "type", "reliable", "latched", "depth"}, with ROS names. Events go to
+A reader or writer is {"topic", "type", "reliable", "latched", "depth"}, with ROS names; "user_data", in
+hexadecimal digits, is what its endpoint announces. Events go to
 standard output, one JSON object a line: `matched` and `sample`, each with its topic and the seconds
 since the participant was made. Commands come on standard input: {"topic", "message"} is written.
 
@@ -71,6 +72,8 @@ def quality(end: dict) -> Qos:
                 duration(seconds=0), Policy.History.KeepLast(depth), -1, -1, -1
             )
         )
+    if "user_data" in end:
+        policies.append(Policy.Userdata(bytes.fromhex(end["user_data"])))
     return Qos(*policies)
 
 

@@ -12,6 +12,7 @@ mod calls;
 mod fast;
 mod foreign;
 mod frames;
+mod hashes;
 mod latched;
 mod opcua_cell;
 mod ring;

@@ -39,6 +39,7 @@ mod policies;
 mod ports;
 mod reply;
 mod rtps;
+mod user_data;
 
 pub(crate) use endpoint::{Reader, Writer};
 
@@ -444,7 +445,7 @@ impl Participant {
                 role,
                 name: name.to_owned(),
                 dds_type: data.type_name.clone(),
-                type_hash: None,
+                type_hash: user_data::type_hash(&found.user_data),
                 reliable: policies::is_reliable(data.reliability),
                 latched: policies::is_latched(data.durability),
             })
@@ -465,7 +466,7 @@ impl Participant {
                 role,
                 name: name.to_owned(),
                 dds_type: data.type_name().clone(),
-                type_hash: None,
+                type_hash: user_data::type_hash(&found.user_data),
                 reliable: policies::is_reliable(qos.reliability()),
                 latched: policies::is_latched(qos.durability()),
             })
@@ -473,6 +474,11 @@ impl Participant {
         let all = self.participant.discovered_readers();
         all.into_iter().filter_map(describe).collect()
     }
+}
+
+/// Whether USER_DATA of an endpoint holds the hash of its type.
+pub(crate) fn has_type_hash(user_data: &[u8]) -> bool {
+    user_data::type_hash(user_data).is_some()
 }
 
 /// Whether a datagram announces a participant, or that it takes its leave.

@@ -23,6 +23,11 @@ pub fn datagram(bytes: &[u8]) {
     black_box(dds::is_announcement(bytes));
 }
 
+/// What an endpoint on DDS says of its type.
+pub fn user_data(bytes: &[u8]) {
+    black_box(dds::has_type_hash(bytes));
+}
+
 /// What somebody calls a topic on DDS, and writes into a key of Zenoh's graph.
 pub fn name(text: &str) {
     black_box(dds::role_of(text));
