@@ -267,6 +267,22 @@ mod tests {
     }
 
     #[test]
+    fn val_rosbag2_of_lyrical_describes_a_bag_in_the_same_terms() {
+        let text = include_str!("../tests/data/lyrical_metadata.yaml");
+        let metadata = BagMetadata::from_yaml(text).unwrap();
+        assert_eq!(metadata.version, METADATA_VERSION);
+        assert_eq!(metadata.ros_distro, "lyrical");
+        assert_eq!(metadata.message_count, 1_164);
+        let names = file_names_of(text).unwrap();
+        assert_eq!(names, metadata.relative_file_paths);
+        assert_eq!(names[0], "0_converted_2026_11_30-17_25_41.mcap");
+        assert_eq!(compression_of(text), None);
+        let point = &metadata.topics_with_message_count[0].topic_metadata;
+        let depth = point.offered_qos_profiles[0].depth;
+        assert_eq!((point.name.as_str(), depth), ("/probe/point", 200));
+    }
+
+    #[test]
     fn a_name_that_leads_out_of_the_directory_is_cut() {
         let text = "rosbag2_bagfile_information:\n  version: 4\n  relative_file_paths:\n  - ../../secret/run_0.mcap\n";
         assert_eq!(file_names_of(text).unwrap(), ["run_0.mcap"]);

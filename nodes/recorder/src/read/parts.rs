@@ -45,11 +45,7 @@ pub(super) fn of(directory: &Path) -> std::io::Result<Parts> {
                 .file_stem()
                 .map(|stem| stem.to_string_lossy().into_owned());
             let stem = stem.unwrap_or_default();
-            let number = stem
-                .rsplit('_')
-                .next()
-                .and_then(|digits| digits.parse::<u64>().ok());
-            found.insert((number, stem), path);
+            found.insert((number(&stem), stem), path);
         }
     }
     let text = regular::text(&directory.join(METADATA_FILE)).unwrap_or_default();
@@ -67,6 +63,29 @@ pub(super) fn of(directory: &Path) -> std::io::Result<Parts> {
     found.retain(|_, path| !parts.files.contains(path));
     parts.files.extend(found.into_values());
     Ok(parts)
+}
+
+/// Place of a file by its name: `run_3`, or as rosbag2 of Lyrical names it, `3_run_2026_11_30-17_24_28`.
+fn number(stem: &str) -> Option<u64> {
+    let place = match stem.split_once('_') {
+        Some((first, rest)) if ends_with_time(rest) => first,
+        _ => stem.rsplit('_').next()?,
+    };
+    place.parse().ok()
+}
+
+/// Whether a name ends with a local time, `_YYYY_MM_DD-HH_MM_SS`.
+fn ends_with_time(name: &str) -> bool {
+    const PATTERN: &[u8] = b"_9999_99_99-99_99_99";
+    let end = name.len().checked_sub(PATTERN.len());
+    let end = end.and_then(|from| name.as_bytes().get(from..));
+    end.is_some_and(|end| {
+        let mut both = end.iter().zip(PATTERN);
+        both.all(|(found, wanted)| match wanted {
+            b'9' => found.is_ascii_digit(),
+            _ => found == wanted,
+        })
+    })
 }
 
 /// Puts files with messages in the order of their log times, where each begins when the one before it has ended or is a copy
@@ -122,4 +141,29 @@ pub(super) fn is_doubled(files: &[BagFile]) -> bool {
         .collect();
     keys.sort_unstable();
     keys.windows(2).any(|pair| pair[0] == pair[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_numbered_at_the_end_and_by_lyrical_in_front_of_a_local_time() {
+        for (stem, expected) in [
+            ("run_3", Some(3)),
+            ("my_run_10", Some(10)),
+            ("2_run_7", Some(7)),
+            ("3_run_2026_11_30-17_24_28", Some(3)),
+            ("10_my_run_2026_11_30-17_24_28", Some(10)),
+            ("0_rosbag2_2026_11_30-17_24_28", Some(0)),
+            // The directory of a recording of Jazzy has its time in its name.
+            ("rosbag2_2026_11_30-17_24_28_4", Some(4)),
+            ("1_é_2026_11_30-17_24_28", Some(1)),
+            ("x_run_2026_11_30-17_24_28", None),
+            ("run", None),
+            ("", None),
+        ] {
+            assert_eq!(number(stem), expected, "{stem}");
+        }
+    }
 }

@@ -219,3 +219,42 @@ fn parts_whose_names_are_exchanged_are_read_in_the_order_of_a_composed_run_alone
         assert!(Bag::open(&path).unwrap().has_doubled_file());
     }
 }
+
+/// Names the files as rosbag2 of Lyrical does, one each ten seconds: `0_run_2026_11_30-17_24_50`.
+fn renamed_as_by_lyrical(path: &Path, files: &[String]) {
+    let metadata = path.join("metadata.yaml");
+    let mut text = fs::read_to_string(&metadata).unwrap();
+    for (place, file) in files.iter().enumerate() {
+        let second = 50 + 10 * place;
+        let (minute, second) = (24 + second / 60, second % 60);
+        let name = format!("{place}_run_2026_11_30-17_{minute}_{second:02}.mcap");
+        fs::rename(path.join(file), path.join(&name)).unwrap();
+        text = text.replace(&format!(" {file}\n"), &format!(" {name}\n"));
+    }
+    assert!(text.contains("ros_distro: jazzy"), "{text}");
+    fs::write(metadata, text.replace("jazzy", "lyrical")).unwrap();
+}
+
+#[test]
+fn a_bag_of_lyrical_is_read_in_order_with_and_without_its_description() {
+    let home = tempfile::tempdir().unwrap();
+    let config = RecorderConfig {
+        max_file_bytes: 8_192,
+        ..small_chunks(ChunkCompression::None)
+    };
+    let (path, summary) = record(home.path(), 700, config);
+    assert!(summary.files.len() > 11, "{:?}", summary.files);
+    renamed_as_by_lyrical(&path, &summary.files);
+    // A recorder that was killed has written no description.
+    for is_described in [true, false] {
+        if !is_described {
+            fs::remove_file(path.join("metadata.yaml")).unwrap();
+        }
+        let bag = Bag::open(&path).unwrap();
+        assert_eq!(bag.description_losses(), [], "{is_described}");
+        assert!(!bag.has_overlapping_files(), "{is_described}");
+        let (found, losses) = read(&bag, Order::File);
+        assert_eq!(losses, [], "{is_described}");
+        expect_first(&found, 700);
+    }
+}
