@@ -26,6 +26,7 @@ def bags(desk: Desk, abbe: str, root: Path, cell: Path) -> None:
     described(desk, ours, counts)
     played(desk, ours, counts)
     into_a_node(desk, abbe, ours, root)
+    converted(desk, abbe, ours, root)
     theirs = recorded(desk, abbe, cell)
     if theirs is not None:
         read_here(desk, abbe, theirs)
@@ -87,6 +88,52 @@ def into_a_node(desk: Desk, abbe: str, bag: Path, root: Path) -> None:
     said = model.said()
     right = re.search(r"^\d+$", said, re.MULTILINE)
     desk.judge("the node answers with a model", "a sequence number", right is not None, said, node.said())
+
+
+CONVERSION = """
+output_bags:
+- uri: {bag}
+  storage_id: mcap
+  storage_preset_profile: zstd_fast
+  max_bagfile_duration: 20
+  all: true
+  all_topics: true
+"""
+
+
+def converted(desk: Desk, abbe: str, bag: Path, root: Path) -> None:
+    """Our bag, compressed and in several files by their recorder, is diagnosed alike with and without its description."""
+    theirs, options = desk.folder / "converted", desk.folder / "conversion.yaml"
+    options.write_text(CONVERSION.format(bag=theirs))
+    desk.see(
+        "our bag is converted",
+        ["ros2", "bag", "convert", "-i", str(bag), "-o", str(options)],
+        limit_s=60.0,
+    )
+    files = sorted(file.name for file in theirs.glob("*.mcap"))
+    desk.judge("into several files", "3 files", len(files) == 3, " ".join(files))
+    wanted = diagnosis(desk, abbe, bag, root)
+    for case in ("with", "without"):
+        found = diagnosis(desk, abbe, theirs, root)
+        right = found is not None and found == wanted
+        seen = "no report" if found is None else f"causes {[cause['effect'] for cause in found['causes']]}"
+        expected = "the report of our bag"
+        desk.judge(f"they are diagnosed alike {case} their description", expected, right, seen, str(found))
+        (theirs / "metadata.yaml").unlink(missing_ok=True)
+
+
+def diagnosis(desk: Desk, abbe: str, bag: Path, root: Path) -> dict | None:
+    """The report of `abbe diagnose` without the bag's place, the hash of its bytes and the time taken."""
+    machine = root / "launch_configs" / "cold_reference" / "machine.yaml"
+    _, said = desk.run([abbe, "diagnose", "--json", "-", str(bag), "--machine", str(machine)], 120.0)
+    if "{" not in said:
+        return None
+    report = json.JSONDecoder().raw_decode(said[said.index("{") :])[0]
+    report.pop("runtime_s", None)
+    for read in report["inputs"]["bags"]:
+        read.pop("path")
+        read.pop("sha256")
+    return report
 
 
 def recorded(desk: Desk, abbe: str, cell: Path) -> Path | None:
