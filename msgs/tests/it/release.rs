@@ -1,10 +1,5 @@
 //! Messages that releases of ROS 2 define differently, against the hash and the bytes of each.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "a test fails by panicking, in its helper functions too"
-)]
-
 use abbe_msgs::builtin_interfaces::msg::Time;
 use abbe_msgs::lifecycle_msgs::msg::{State, Transition, TransitionEvent};
 use abbe_msgs::{Message, Release, from_cdr, lyrical, to_cdr};
