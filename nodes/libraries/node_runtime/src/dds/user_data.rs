@@ -14,15 +14,15 @@
 
 /// Longest text that is read; that of ROS 2 has 81 bytes.
 const LONGEST_TEXT: usize = 1_024;
-const KEY: &str = "typehash";
-const VERSION: &str = "RIHS01_";
+const HASH_KEY: &str = "typehash";
+const HASH_VERSION: &str = "RIHS01_";
 const DIGITS: usize = 64;
 
 /// The type hash in the value of a parameter USER_DATA; `None`: there is none, or the value is malformed.
 pub(super) fn type_hash(parameter: &[u8]) -> Option<String> {
     let mut pairs = text(parameter)?.split(';');
     let hash = pairs
-        .find_map(|pair| pair.split_once('=').filter(|(key, _)| *key == KEY))?
+        .find_map(|pair| pair.split_once('=').filter(|(key, _)| *key == HASH_KEY))?
         .1;
     is_hash(hash).then(|| hash.to_owned())
 }
@@ -40,7 +40,7 @@ fn text(parameter: &[u8]) -> Option<&str> {
 
 /// (3)
 fn is_hash(text: &str) -> bool {
-    let digits = text.strip_prefix(VERSION);
+    let digits = text.strip_prefix(HASH_VERSION);
     digits.is_some_and(|digits| {
         let mut all = digits.bytes();
         digits.len() == DIGITS && all.all(|one| matches!(one, b'0'..=b'9' | b'a'..=b'f'))
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     fn hash() -> String {
-        format!("{VERSION}{}", "0123456789abcdef".repeat(4))
+        format!("{HASH_VERSION}{}", "0123456789abcdef".repeat(4))
     }
 
     /// A parameter's value with the text behind its length in one byte order.

@@ -42,7 +42,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("p1_urad", 300.0, 10.0),
         Parameter::amplitude("p2_urad", 300.0, 8.0),
     ],
-    free: &CURVE,
+    free: &TURN,
     moment: Moment::Mean,
     wanders: 0.0,
     needs: "positions over the axis' travel, with two arms",
@@ -70,9 +70,9 @@ const CURVE_URAD: &[Parameter] = &[
     Parameter::ordinate("free_15_of_16_urad", 300.0, 3.0),
 ];
 /// The same, then the ends of the part of the travel that it is over.
-const CURVE: [Parameter; CURVE_URAD.len() + 2] = with_part(CURVE_URAD);
+const TURN: [Parameter; CURVE_URAD.len() + 2] = with_part(CURVE_URAD);
 /// Place of the lower end of the part among the values.
-const FROM: usize = 2 + CURVE_URAD.len();
+const TURN_FROM: usize = 2 + CURVE_URAD.len();
 
 struct AngularError {
     component: ErrorComponent,
@@ -85,7 +85,7 @@ impl AngularError {
     fn new(target: &Target, values: &[f64]) -> Self {
         Self {
             component: target.component(),
-            part_mm: [values[FROM], values[FROM + 1]],
+            part_mm: [values[TURN_FROM], values[TURN_FROM + 1]],
             polynomial_rad: std::array::from_fn(|k| values[k] * 1e-6),
             local_rad: std::array::from_fn(|k| values[4 + k] * 1e-6),
         }

@@ -44,7 +44,7 @@ pub static KIND: Kind = Kind {
         Parameter::amplitude("p2_um", 60.0, 3.0),
         Parameter::amplitude("p3_um", 60.0, 2.0),
     ],
-    free: &CURVE,
+    free: &BEND,
     moment: Moment::Mean,
     wanders: 0.0,
     needs: "readings across the axis over its travel",
@@ -53,13 +53,13 @@ pub static KIND: Kind = Kind {
 
 /// The heights of the curve, the ends of the part of the travel that it is over, and its slope there: about the line through
 /// the whole travel it has one.
-const CURVE: [Parameter; CURVE_UM.len() + 3] = {
+const BEND: [Parameter; CURVE_UM.len() + 3] = {
     let mut all = with_part::<{ CURVE_UM.len() + 3 }>(CURVE_UM);
     all[CURVE_UM.len() + 2] = Parameter::ordinate("free_p1_um", 500.0, 1.0);
     all
 };
 /// Place of the lower end of the part among the values.
-const FROM: usize = 2 + CURVE_UM.len();
+const BEND_FROM: usize = 2 + CURVE_UM.len();
 
 struct Straightness {
     component: ErrorComponent,
@@ -71,13 +71,13 @@ struct Straightness {
 
 impl Straightness {
     fn new(target: &Target, values: &[f64]) -> Self {
-        let part_mm = [values[FROM], values[FROM + 1]];
+        let part_mm = [values[BEND_FROM], values[BEND_FROM + 1]];
         let is_part = part_mm[0] < part_mm[1];
         Self {
             component: target.component(),
             part_mm,
             slope_mm: if is_part {
-                values[FROM + 2] * 1e-3
+                values[BEND_FROM + 2] * 1e-3
             } else {
                 0.0
             },
