@@ -84,7 +84,7 @@ fn stamped_event(bytes: &[u8]) -> Result<Vec<u8>, WireError> {
     }))
 }
 
-/// The event of Jazzy: its stamp counts nanoseconds, 0 where there is none.
+/// The event in Jazzy's definition: a stamp in nanoseconds, 0 where it is absent.
 fn counted_event(bytes: &[u8]) -> Result<Vec<u8>, WireError> {
     let lyrical::lifecycle_msgs::msg::TransitionEvent {
         stamp,

@@ -296,8 +296,8 @@ fn counted(turns: &[bool]) -> Vec<u32> {
     turns.iter().scan(0, add).collect()
 }
 
-/// Share of the way at either end of a run within which a turn is none: a circle that is measured in motion begins or ends where an
-/// axis turns, and a tick more or less there is no other path.
+/// A turn of an axis within this share of the way from either end of a run does not count. Circles measured in motion begin or end
+/// where an axis turns, and repeats may differ by a tick there.
 const END_SHARE: f64 = 0.01;
 /// Arm at which a turn of a rotary axis counts as way.
 const ROTARY_ARM_MM: f64 = 100.0;

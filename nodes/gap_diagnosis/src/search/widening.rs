@@ -17,7 +17,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use metrology::Axis;
 use nalgebra::{DMatrix, DVector};
-use twin::effects::Target;
+use twin::effects::{Kind, Target};
 
 use crate::noise::normal::Normal;
 use crate::noise::stack::Stack;
@@ -159,6 +159,14 @@ fn through_targets(stack: &Stack<'_>, instance: &Instance, mut values: Vec<f64>)
     values
 }
 
+/// Whether a curve is over a part of its axis' travel: one whose ends are both zero is over all of it.
+fn is_over_part(kind: &Kind, values: &[f64]) -> bool {
+    let names = kind.parameters.iter().chain(kind.free).map(|p| p.name);
+    names
+        .zip(values)
+        .any(|(name, value)| ENDS.contains(&name) && *value != 0.0)
+}
+
 /// Lets a curve be over a part of its axis' travel, mm.
 fn put_ends(instance: &Instance, [low_mm, high_mm]: [f64; 2], values: &mut [f64]) {
     let own = instance.kind.parameters.iter().chain(instance.kind.free);
@@ -266,9 +274,7 @@ fn add_parts(
     let all = 0..form.amplitudes.len();
     let kind = signatures.instances[form.instance].kind;
     let names = || kind.parameters.iter().chain(kind.free).map(|p| p.name);
-    let is_part = names()
-        .zip(&form.values)
-        .any(|(name, value)| name == ENDS[0] && *value != 0.0);
+    let is_part = is_over_part(kind, &form.values);
     let is_first = |place: usize| {
         let name = names().nth(place);
         place < own || (is_part && name.is_some_and(|name| FIRST_ORDERS.contains(&name)))
@@ -290,5 +296,30 @@ fn add_parts(
         }
         taken.sort_unstable();
         signatures.add_part(wide, &taken);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use metrology::ErrorComponent;
+    use twin::effects;
+
+    use super::*;
+
+    #[test]
+    fn a_part_that_begins_or_ends_at_the_machines_zero_is_a_part() {
+        let kind = effects::kind("straightness").unwrap();
+        let instance = Instance {
+            kind,
+            target: Target::Component(ErrorComponent::SQUARENESS[0]),
+            begins: None,
+        };
+        let of = |part_mm: [f64; 2]| {
+            let mut values = vec![0.0; kind.parameters.len() + kind.free.len()];
+            put_ends(&instance, part_mm, &mut values);
+            is_over_part(kind, &values)
+        };
+        assert!(of([0.0, 90.0]) && of([-90.0, 0.0]) && of([-40.0, 90.0]));
+        assert!(!of([0.0, 0.0]));
     }
 }

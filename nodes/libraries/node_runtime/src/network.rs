@@ -164,7 +164,7 @@ impl Participant {
         self.release
     }
 
-    /// The hash by which the graph knows a type of ours, in its form on the wire; `None`: it is none of ours.
+    /// The type hash of one of Abbe's own types, as the graph writes it; none for any other type.
     pub fn own_hash(&self, dds_type: &str) -> Option<&'static str> {
         own_hash(self.release, dds_type)
     }

@@ -18,7 +18,7 @@ const HASH_KEY: &str = "typehash";
 const HASH_VERSION: &str = "RIHS01_";
 const DIGITS: usize = 64;
 
-/// The type hash in the value of a parameter USER_DATA; `None`: there is none, or the value is malformed.
+/// The type hash in the value of a parameter USER_DATA; none where it is absent or malformed.
 pub(super) fn type_hash(parameter: &[u8]) -> Option<String> {
     let mut pairs = text(parameter)?.split(';');
     let hash = pairs
