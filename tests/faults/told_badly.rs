@@ -86,6 +86,9 @@ impl Tongue {
 fn touches_that_are_told_badly_change_no_point_and_no_block() {
     namespace::alone("touches told badly", || {
         let scenario = Scenario::copy_of("cold_reference");
+        // On a busy computer the time runs ahead of positions that have arrived and were not taken yet.
+        let patient = "ros__parameters:\n    hold_ms: 2000.0";
+        scenario.replace("probe.yaml", "ros__parameters:", patient);
         let topics = [STATES, TOUCHES, LATENCY, SEGMENTS];
         let mut twins = Twins::start(domain(11), &scenario, &["probe"], &topics);
         let began = Instant::now();

@@ -212,7 +212,9 @@ impl Twins {
             }
             // A node that is behind takes what waits topic by topic: an end that it takes first is the end of a run without
             // readings, however long it is held.
-            if topic == topics::TEST_SEGMENT.name && is_end(message.data) {
+            // A touch is corrected with what came before it, and told again at the node's own time.
+            let is_touch = topic == topics::PROBE_TRIGGER.name;
+            if is_touch || (topic == topics::TEST_SEGMENT.name && is_end(message.data)) {
                 self.all_is_taken(&before);
             }
             for twin in 0..TWINS.len() {
@@ -226,7 +228,7 @@ impl Twins {
             for bytes in besides {
                 self.tell(BAD, topic, &bytes);
             }
-            if topic == topics::PROBE_TRIGGER.name && held.is_due() {
+            if is_touch && held.is_due() {
                 self.wait_for_a_point_with_latency();
                 for bytes in std::mem::take(&mut held.besides) {
                     self.tell(BAD, topics::LATENCY.name, &bytes);
