@@ -1,6 +1,6 @@
 //! What takes bytes from outside, on its corpus and on seeded changes of it: no panic, no hang, no allocation without
 //! bound. `cargo test --release --test fuzz -- mcap 1000000 [SEED]` runs one target as often as told, `-- all 10000` each;
-//! `cargo +nightly fuzz run mcap tests/fuzz/corpus/mcap --fuzz-dir tests/fuzz` lets libFuzzer look for more.
+//! `cargo +nightly fuzz run mcap tests/fuzz/corpus/mcap --fuzz-dir tests/fuzz --features run` lets libFuzzer look for more.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 #![expect(clippy::expect_used, reason = "a property that does not hold fails")]
 #![expect(
