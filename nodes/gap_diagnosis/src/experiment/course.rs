@@ -375,7 +375,8 @@ fn finished(
     course: Course,
     own: Vec<Channel>,
 ) -> Option<Run> {
-    let motion = Motion::new(course.time_s, course.axes, course.position).ok()?;
+    let mut motion = Motion::new(course.time_s, course.axes, course.position).ok()?;
+    motion.follow(frame.machine);
     let read = |channel: &Channel, at: usize| Reading {
         channel: channel.clone(),
         at,

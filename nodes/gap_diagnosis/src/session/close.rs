@@ -45,6 +45,7 @@ impl SessionBuilder {
         }
         let times = times_s(&open.ticks);
         let mut motion = of(&open.ticks, times, self.axes)?;
+        motion.follow(&self.machine);
         let touches = self.touches(&open, &motion);
         as_approached(&touches, &mut motion);
         let selection = Selection::of(&open.segment, &motion, open.lead_in, self.config.settle_s);
@@ -210,6 +211,7 @@ fn as_approached(touches: &[(Touch, f64)], motion: &mut Motion) {
         for axis in motion.axes.iter() {
             motion.velocity[axis][tick] = motion.velocity[axis][before];
             motion.acceleration[axis][tick] = motion.acceleration[axis][before];
+            motion.driven[axis][tick] = motion.driven[axis][before];
         }
     }
 }

@@ -103,6 +103,7 @@ pub(super) fn thin(motion: &Motion, marks: &[bool]) -> (Motion, Vec<usize>) {
         position: all(&motion.position),
         velocity: all(&motion.velocity),
         acceleration: all(&motion.acceleration),
+        driven: all(&motion.driven),
         sense: PerAxis::from_fn(|axis| pick(&kept, &motion.sense[axis])),
         since_reversal: all(&motion.since_reversal),
         since_reversal_s: all(&motion.since_reversal_s),

@@ -54,6 +54,7 @@ pub(super) fn motion(
     for axis in axes.iter() {
         motion.velocity[axis].fill(0.0);
         motion.acceleration[axis].fill(0.0);
+        motion.driven[axis].fill(0.0);
     }
     Ok(motion)
 }

@@ -30,7 +30,7 @@
 //! inside a circle by r'' h²/12 (1 µm at 750 mm/s² and 4 ms): from the mean velocity of the step and its change,
 //!
 //! ```text
-//!   dr/dt = (r_1 - r_0) / h + (v_1 - v_0) (t / h - 1/2),   v of central differences    (7)
+//!   dr/dt = (r_1 - r_0) / h + (v_1 - v_0) (t / h - 1/2),   v as in `Motion`            (7)
 //! ```
 //!
 //! The run is taken to begin in the state (2). This is nominal: every prediction of the machine as it is
@@ -56,6 +56,7 @@ use nalgebra::{SMatrix, SVector};
 use super::motion::Motion;
 use super::response::Response;
 use crate::effects::{Effect, Scene};
+use machine::MachineFile;
 use machine::file::{AxisEntry, VelocityLoopEntry};
 
 use waves::Inner;
@@ -71,6 +72,28 @@ impl Effect for Following {
     fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
         for axis in scene.machine.axes.keys() {
             add_errors(scene, *axis, &mut response.servo[*axis]);
+        }
+    }
+}
+
+impl Motion {
+    /// Lets the axes go as the loops of a machine file make them. What has inertia yields to that acceleration: where the
+    /// command's changes within the loops' time, it is another one.
+    pub fn follow(&mut self, machine: &MachineFile) {
+        for (axis, entry) in &machine.axes {
+            if self.position[*axis].is_empty() {
+                continue;
+            }
+            let mut follower = Follower::new(entry, self, *axis);
+            let each = (0..self.len()).map(|tick| {
+                if tick > 0 {
+                    let step_s = self.time_s[tick] - self.time_s[tick - 1];
+                    let (begin, change) = within(self, *axis, tick, step_s);
+                    follower.advance(begin, change, step_s);
+                }
+                follower.acceleration()
+            });
+            self.driven[*axis] = each.collect();
         }
     }
 }
@@ -194,6 +217,19 @@ impl Follower {
         self.state[VELOCITY]
     }
 
+    /// Acceleration of the motor.
+    pub(crate) fn acceleration(&self) -> f64 {
+        let state = &self.state;
+        match &self.rate {
+            Some(rate) => (rate.row(VELOCITY) * state)[0],
+            // Of v = f r' - K e.
+            None => {
+                let slower = state[VELOCITY] - state[COMMAND];
+                self.gains.feedforward * state[CHANGE] - self.gains.position_per_s * slower
+            }
+        }
+    }
+
     /// Goes on by a step in which the command's velocity changes evenly from `begin` by `change`.
     pub(crate) fn advance(&mut self, begin: f64, change: f64, step_s: f64) {
         let is_new = (step_s - self.period_s).abs() > SAME_STEP_S;
@@ -223,6 +259,7 @@ impl Follower {
         let lag = change / step_s / gains.position_per_s;
         let steady = [begin - lag, begin + change - lag].map(|v| -gains.left_s() * v);
         let error = steady[1] + (self.state[ERROR] - steady[0]) * self.kept; // (1)
+        (self.state[COMMAND], self.state[CHANGE]) = (begin + change, change / step_s);
         self.state[ERROR] = error;
         self.state[VELOCITY] = gains.feedforward * (begin + change) - gains.position_per_s * error;
     }

@@ -20,6 +20,8 @@ pub struct Motion {
     pub velocity: PerAxis<Vec<f64>>,
     /// Its second derivative, per second squared.
     pub acceleration: PerAxis<Vec<f64>>,
+    /// Acceleration of the axes themselves: that of the command, until [`Motion::follow`] puts the loops between.
+    pub driven: PerAxis<Vec<f64>>,
     /// Direction of the latest motion: -1, +1, or 0 before the first.
     pub sense: PerAxis<Vec<i8>>,
     /// Way since the axis last turned round; infinite before the first turn.
@@ -32,8 +34,8 @@ pub struct Motion {
 const STANDSTILL: f64 = 1e-6;
 
 impl Motion {
-    /// Builds the motion from time and commanded positions; velocity and acceleration are central differences
-    /// over the recorded spacing.
+    /// Builds the motion from time and commanded positions; velocity and acceleration are slopes of parabolas through
+    /// neighbours, at whatever spacing they were recorded.
     ///
     /// # Errors
     /// [`TwinError::Lengths`] where an axis has another number of entries than time,
@@ -76,6 +78,7 @@ impl Motion {
         for axis in axes.iter() {
             motion.velocity[axis] = derivative(&motion.time_s, &motion.position[axis]);
             motion.acceleration[axis] = derivative(&motion.time_s, &motion.velocity[axis]);
+            motion.driven[axis].clone_from(&motion.acceleration[axis]);
             motion.turns(axis);
         }
         Ok(motion)
@@ -150,17 +153,27 @@ impl Motion {
     }
 }
 
-/// Central differences; one-sided at the ends.
+/// Steps that differ by less are even, share of them.
+const SAME_STEP: f64 = 1e-6;
+
+/// The slope of the parabola through each value and its neighbours, whatever the steps to them: a tick that was not recorded
+/// moves no slope. One-sided at the ends.
 fn derivative(time_s: &[f64], value: &[f64]) -> Vec<f64> {
     let n = value.len();
     (0..n)
         .map(|k| {
             let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
             if a == b {
-                0.0
-            } else {
-                (value[b] - value[a]) / (time_s[b] - time_s[a])
+                return 0.0;
             }
+            let whole = (value[b] - value[a]) / (time_s[b] - time_s[a]);
+            let (before_s, after_s) = (time_s[k] - time_s[a], time_s[b] - time_s[k]);
+            if a == k || b == k || (after_s - before_s).abs() <= SAME_STEP * (after_s + before_s) {
+                return whole;
+            }
+            let before = (value[k] - value[a]) / before_s;
+            let after = (value[b] - value[k]) / after_s;
+            (before * after_s + after * before_s) / (before_s + after_s)
         })
         .collect()
 }
@@ -198,6 +211,33 @@ mod tests {
         assert!(at(-3.0).abs() < 1e-12);
         assert!((at(9.0) - 12.5).abs() < 1e-12);
         assert!(motion.position_at(Axis::Y, 0.002).abs() < 1e-12);
+    }
+
+    #[test]
+    fn ticks_that_were_not_recorded_move_neither_velocity_nor_acceleration() {
+        let is_missing = |k: &usize| k % 17 == 5 || k % 23 == 9;
+        let time_s: Vec<f64> = (0..2000)
+            .filter(|k| !is_missing(k))
+            .map(|k| 0.004 * k as f64)
+            .collect();
+        let (radius_mm, rad_per_s) = (50.0, 2.0_f64);
+        let mut all = PerAxis::<Vec<f64>>::default();
+        all[Axis::X] = time_s
+            .iter()
+            .map(|t| radius_mm * (rad_per_s * t).cos())
+            .collect();
+        let motion = Motion::new(time_s, AxisSet::EMPTY.with(Axis::X), all).expect("a motion");
+        let (speed, bend) = (radius_mm * rad_per_s, radius_mm * rad_per_s * rad_per_s);
+        for k in 3..motion.len() - 3 {
+            let turned = rad_per_s * motion.time_s[k];
+            let velocity = motion.velocity[Axis::X][k] + speed * turned.sin();
+            let acceleration = motion.acceleration[Axis::X][k] + bend * turned.cos();
+            assert!(velocity.abs() < 1e-4 * speed, "{k}: {velocity} mm/s");
+            assert!(
+                acceleration.abs() < 2e-2 * bend,
+                "{k}: {acceleration} mm/s2"
+            );
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //!   f = sgn(last motion) f_0 + f_1 v                                      (2)
 //! ```
 //!
-//! x is the place within the travel, -1 to 1: a screw that is held at one end is softer at the other. The screw drags the
+//! a is the axis' own acceleration, as its loops make it. x is the place within the travel, -1 to 1: a screw that is held at one end is softer at the other. The screw drags the
 //! slide through the friction of its guides as well: f is `guide_friction` of the machine file, zero where it tells none.
 //!
 //! | symbol | here | unit |
@@ -66,7 +66,7 @@ impl Effect for DriveWindup {
         let linear = scene.machine.linear(self.axis);
         let friction = linear.and_then(|linear| linear.guide_friction);
         let (velocity, sense) = (&motion.velocity[self.axis], &motion.sense[self.axis]);
-        let ticks = motion.acceleration[self.axis]
+        let ticks = motion.driven[self.axis]
             .iter()
             .zip(&motion.position[self.axis]);
         let sums = response.drive[self.axis].iter_mut();

@@ -2,8 +2,8 @@
 //!
 //! # Model
 //!
-//! The force that every recording contains is the inertia of what an axis accelerates; the frame gives way
-//! against it, far below its first resonance in proportion:
+//! The force that every recording contains is the inertia of what an axis accelerates, as its loops make it go. The frame gives
+//! way against it, far below its first resonance in proportion:
 //!
 //! ```text
 //!   tip = -(m/k) a = -a / w0 2                                            (1)
@@ -66,7 +66,7 @@ struct LoadDeflection {
 
 impl Effect for LoadDeflection {
     fn add_to(&self, scene: &Scene<'_>, response: &mut Response) {
-        let acceleration = &scene.run.motion.acceleration[self.axis];
+        let acceleration = &scene.run.motion.driven[self.axis];
         for (step, compliance_s2) in self.compliance_s2.into_iter().enumerate() {
             if compliance_s2.abs() > 0.0 {
                 let sums = &mut response.tip_mm[(self.axis.index() + step) % 3];

@@ -77,7 +77,7 @@ impl Effect for StructuralRinging {
         let motion = &scene.run.motion;
         let mut mode = Mode::new(self.rad_per_s, self.damping);
         let mut before = None;
-        let ticks = motion.acceleration[self.axis].iter().zip(&motion.time_s);
+        let ticks = motion.driven[self.axis].iter().zip(&motion.time_s);
         let sums = response.tip_mm[self.axis.index()].iter_mut();
         for (sum, (a, at_s)) in sums.zip(ticks) {
             if let Some((before_a, before_s)) = before {

@@ -3,9 +3,10 @@
 use machine::file::{AxisEntry, VelocityLoopEntry};
 use metrology::Axis;
 use twin::Following;
+use twin::Motion;
 use twin::effects;
 
-use crate::effects::scene::{TICK_S, bench, circle, greatest, integrate, respond};
+use crate::effects::scene::{TICK_S, bench, circle, greatest, integrate, respond, response_of};
 
 #[test]
 fn val_the_loop_integrated_finely() {
@@ -85,6 +86,69 @@ fn val_the_loop_with_its_velocity_loop_integrated_finely() {
     let ideal = respond(&bench(), &run, &Following);
     let added = (400..ticks).map(|k| response.servo[Axis::X][k] - ideal.servo[Axis::X][k]);
     assert!(greatest(added) > 1e-3, "the velocity loop must be seen");
+}
+
+/// A command that turns round sharply, as at a corner: its acceleration is there for less than the loops' time.
+#[test]
+fn val_a_motor_accelerates_as_its_loop_integrated_finely() {
+    let machine = with_velocity_loop(0.4);
+    let mut run = circle(25.0, 100.0, 1.0);
+    let (slow_mm_s, sharp_mm_s2, turn_s) = (20.0, 2000.0, 1.0);
+    // Even speed, a turn of 20 ms, even speed back.
+    let velocity_at = |t: f64| (slow_mm_s - sharp_mm_s2 * (t - turn_s).max(0.0)).max(-slow_mm_s);
+    let at = |t: f64| {
+        let turned = (t - turn_s).clamp(0.0, 2.0 * slow_mm_s / sharp_mm_s2);
+        let beyond = (t - turn_s - turned).max(0.0);
+        slow_mm_s * (t.min(turn_s) + turned - beyond) - 0.5 * sharp_mm_s2 * turned * turned
+    };
+    let (axes, times) = (run.motion.axes, run.motion.time_s.clone());
+    let mut position = run.motion.position.clone();
+    position[Axis::X] = times.iter().map(|t| at(*t)).collect();
+    run.motion = Motion::new(times, axes, position).unwrap();
+    run.motion.follow(&machine);
+    let x = machine.linear(Axis::X).unwrap();
+    let (gain, share) = (x.position_gain_per_s, x.velocity_feedforward);
+    let frequency = std::f64::consts::TAU * 30.0;
+    let loop_of = |t: f64, s: &[f64; 4]| {
+        let missing = gain * (at(t) - s[0]) + share * velocity_at(t) - s[3];
+        let acceleration = 2.0 * 0.9 * frequency * missing + s[2];
+        [
+            s[1],
+            acceleration,
+            frequency * frequency * missing,
+            (s[1] - s[3]) / 0.4e-3,
+        ]
+    };
+    let ticks = run.motion.len();
+    let start = [0.0, slow_mm_s, 0.0, slow_mm_s];
+    let motor = integrate(start, TICK_S / 20.0, 20 * (ticks - 1), 20, loop_of);
+    let near = 900..1200;
+    let off = near.clone().map(|k| {
+        let t = run.motion.time_s[k];
+        run.motion.driven[Axis::X][k] - loop_of(t, &motor[k])[1]
+    });
+    let most = greatest(near.clone().map(|k| run.motion.driven[Axis::X][k]));
+    let off = greatest(off);
+    // Differences spread the ends of the turn over a tick on either side.
+    assert!(off < 0.05 * most, "{off} of {most}");
+    // What has inertia yields to that, not to the command's.
+    for (effect, parameter) in [
+        ("drive_windup", "windup_um"),
+        ("load_deflection", "along_um"),
+    ] {
+        let response = response_of(&machine, &run, effect, "X", &[(parameter, 3.0)]);
+        let of = |moved_mm: &[f64], k: usize| moved_mm.get(k).copied().unwrap_or(0.0);
+        let yielded = near.clone().map(|k| {
+            let moved_mm = of(&response.drive[Axis::X], k) + of(&response.tip_mm[0], k);
+            moved_mm + 3e-6 * loop_of(run.motion.time_s[k], &motor[k])[1]
+        });
+        let (off_um, most_um) = (greatest(yielded) * 1e3, 3e-3 * most);
+        println!("{effect} off by {off_um:.3} um of {most_um:.2}");
+        assert!(off_um < 0.05 * most_um, "{effect}: {off_um}");
+    }
+    let of_command =
+        near.map(|k| run.motion.acceleration[Axis::X][k] - run.motion.driven[Axis::X][k]);
+    assert!(greatest(of_command) > 0.4 * most, "the loop must be seen");
 }
 
 #[test]
