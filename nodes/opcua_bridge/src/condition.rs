@@ -130,7 +130,9 @@ pub enum Condition {
     #[error("the server looks and keeps as it was asked")]
     AsAsked,
     /// Messages of the server were lost.
-    #[error("{lost} messages of the server lost, from number {from} on; {total} so far")]
+    #[error(
+        "{lost} messages of the server lost, from number {from} on; {total} so far. Every node is read again; changes between are missing"
+    )]
     SequenceGap {
         /// First number that was lost.
         from: u32,

@@ -185,9 +185,19 @@ pub struct Settings {
 /// When the text is no such URL.
 pub fn checked_endpoint(endpoint: &str) -> Result<String, BridgeError> {
     let rest = endpoint.strip_prefix("opc.tcp://");
-    let host = rest.map(|rest| rest.split(['/', ':']).next().unwrap_or_default());
+    let place = rest.map(|rest| rest.split('/').next().unwrap_or_default());
+    if let Some((_, host)) = place.and_then(|place| place.rsplit_once('@')) {
+        let host = host.to_owned();
+        return Err(BridgeError::UserInEndpoint { host });
+    }
+    let is_port = |port: &str| port.parse::<u16>().is_ok_and(|port| port > 0);
+    let is_place = place.is_some_and(|place| match place.rsplit_once(':') {
+        // The colons of [::1] are no port's.
+        Some((host, port)) if !port.ends_with(']') => !host.is_empty() && is_port(port),
+        _ => !place.is_empty(),
+    });
     let is_word = endpoint.bytes().all(|byte| byte.is_ascii_graphic());
-    if host.is_some_and(|host| !host.is_empty()) && is_word && endpoint.len() <= 4096 {
+    if is_place && is_word && endpoint.len() <= 4096 {
         Ok(endpoint.to_owned())
     } else {
         let endpoint = endpoint.to_owned();

@@ -12,11 +12,19 @@ pub enum BridgeError {
     Parameter(#[from] BoundError),
     /// The endpoint is no URL of OPC UA's binary protocol.
     #[error(
-        "endpoint = {endpoint:?}: must be opc.tcp://HOST:PORT, with a path where the server has one"
+        "endpoint = {endpoint:?}: must be opc.tcp://HOST:PORT, with a port from 1 to 65535 and a path where the server has one"
     )]
     Endpoint {
         /// What was read.
         endpoint: String,
+    },
+    /// The endpoint holds a user, and what holds it is shown in messages.
+    #[error(
+        "endpoint: opc.tcp://…@{host} has a user, which messages would show: name it in security.user, with security.password_file"
+    )]
+    UserInEndpoint {
+        /// What stands behind the user.
+        host: String,
     },
     /// A secured connection needs a folder of certificates.
     #[error(

@@ -23,8 +23,8 @@ use crate::stage::{IoCommand, IoEvent};
 const QUEUE_LENGTH: usize = 64;
 /// Bytes of one message of the server at most.
 const MESSAGE_BYTES: usize = 16 << 20;
-/// Bytes of a text at most; a longer one ends the connection, one above 65,536 is refused by itself.
-const TEXT_BYTES: usize = 1 << 20;
+/// The shortest chunks that a server may send a message in (OPC 10000-6, 6.7.2).
+const CHUNK_BYTES: usize = 8192;
 /// Elements of an array at most.
 const ARRAY_LENGTH: usize = 100_000;
 /// A connection that is given up has so long to say goodbye.
@@ -197,8 +197,10 @@ fn builder(settings: &Settings, folder: &Path) -> ClientBuilder {
         .max_failed_keep_alive_count(2)
         .request_timeout(duration(settings.reply_timeout))
         .max_message_size(MESSAGE_BYTES)
-        .max_string_length(TEXT_BYTES)
-        .max_byte_string_length(TEXT_BYTES)
+        .max_chunk_count(MESSAGE_BYTES / CHUNK_BYTES)
+        // What does not decode ends the connection: a text has the limit of its message, and above 65,536 bytes the stage refuses it.
+        .max_string_length(MESSAGE_BYTES)
+        .max_byte_string_length(MESSAGE_BYTES)
         .max_array_length(ARRAY_LENGTH)
 }
 

@@ -17,9 +17,9 @@ use opcua::client::{
     SessionDropGuard, SessionPollResult,
 };
 use opcua::types::{
-    DataChangeNotification, MonitoredItemCreateRequest, MonitoringMode, MonitoringParameters,
-    NodeId, NotificationMessage, ReadValueId, StatusChangeNotification, StatusCode,
-    TimestampsToReturn,
+    DataChangeNotification, DataValue, Error, MonitoredItemCreateRequest, MonitoringMode,
+    MonitoringParameters, NodeId, NotificationMessage, ReadValueId, StatusChangeNotification,
+    StatusCode, TimestampsToReturn,
 };
 use tokio::sync::mpsc::{Receiver, Sender, channel};
 use tokio::task::JoinHandle;
@@ -175,6 +175,16 @@ pub(super) async fn visit(
 fn said(reason: &str) -> IoEvent {
     let reason = reason.to_owned();
     IoEvent::Ended { reason }
+}
+
+/// Whether an answer is beyond what this side, or the server, puts into one message.
+fn is_too_long(status: StatusCode) -> bool {
+    let beyond = [
+        StatusCode::BadEncodingLimitsExceeded,
+        StatusCode::BadResponseTooLarge,
+        StatusCode::BadTcpMessageTooLarge,
+    ];
+    beyond.contains(&status)
 }
 
 fn ended(error: impl std::fmt::Display) -> IoEvent {
@@ -350,10 +360,14 @@ impl<'a> Visit<'a> {
     /// Takes a message; what is missing before it is asked for again first.
     async fn take(&mut self, (at, message): Note) -> Option<IoEvent> {
         let dropped = self.dropped.swap(0, Ordering::Relaxed);
-        if dropped > 0
-            && let Some(ended) = self.send(IoEvent::Dropped { count: dropped })
-        {
-            return Some(ended);
+        if dropped > 0 {
+            let ended = self.send(IoEvent::Dropped { count: dropped });
+            if ended.is_some() {
+                return ended;
+            }
+            if let Some(ended) = self.read_again(|is_as_sent| !is_as_sent).await {
+                return Some(ended);
+            }
         }
         let data = message.notification_data.as_ref();
         let has_data = data.is_some_and(|data| !data.is_empty());
@@ -392,7 +406,11 @@ impl<'a> Visit<'a> {
         if lost == 0 {
             return None;
         }
-        self.send(IoEvent::Lost { from, count: lost })
+        if let Some(ended) = self.send(IoEvent::Lost { from, count: lost }) {
+            return Some(ended);
+        }
+        // What changed in them alone is told of by nothing else.
+        self.read_again(|is_as_sent| !is_as_sent).await
     }
 
     /// The session was taken up again: what was missed is asked for, then what holds is read.
@@ -418,25 +436,51 @@ impl<'a> Visit<'a> {
         if let Some(ended) = self.send(IoEvent::Resumed { republished }) {
             return Some(ended);
         }
+        // What is another than was sent last waits in the subscription, and comes in its order.
+        self.read_again(|is_as_sent| is_as_sent).await
+    }
+
+    /// Reads every node, and hands those over that are as they were sent last, or those that are not.
+    async fn read_again(&self, is_wanted: fn(bool) -> bool) -> Option<IoEvent> {
         for chunk in self.nodes.chunks(NODES_CHUNK) {
-            let asked: Vec<ReadValueId> = chunk
-                .iter()
-                .map(|(_, node)| ReadValueId::from(node.clone()))
-                .collect();
-            let read = self.session.read(&asked, TimestampsToReturn::Both, 0.0);
-            let values = match read.await {
+            let values = match self.read(chunk).await {
                 Ok(values) => values,
                 Err(error) => return Some(ended(error)),
             };
             let held = chunk.iter().zip(values);
             let held = held.map(|((item, _), value)| change(*item, value, true));
-            // What is another than was sent last waits in the subscription, and comes in its order.
-            let held = held.filter(|change| self.sent.get(&change.item) == Some(&mark(change)));
+            let held =
+                held.filter(|change| is_wanted(self.sent.get(&change.item) == Some(&mark(change))));
             if let Some(ended) = self.send(IoEvent::Changed(held.collect())) {
                 return Some(ended);
             }
         }
         None
+    }
+
+    /// Values of some nodes. Where the answer is too long they are read one by one, and a value that is too long by itself is
+    /// absent with that status.
+    async fn read(&self, nodes: &[(usize, NodeId)]) -> Result<Vec<DataValue>, Error> {
+        let asked = |(_, node): &(usize, NodeId)| ReadValueId::from(node.clone());
+        let all: Vec<ReadValueId> = nodes.iter().map(asked).collect();
+        let read = self.session.read(&all, TimestampsToReturn::Both, 0.0);
+        match read.await {
+            Err(error) if is_too_long(error.status()) => {}
+            read => return read,
+        }
+        let mut values = Vec::with_capacity(nodes.len());
+        for one in all.chunks(1) {
+            let read = self.session.read(one, TimestampsToReturn::Both, 0.0);
+            match read.await {
+                Ok(read) => values.push(read.into_iter().next().unwrap_or_default()),
+                Err(error) if is_too_long(error.status()) => values.push(DataValue {
+                    status: Some(error.status()),
+                    ..DataValue::default()
+                }),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(values)
     }
 
     /// Hands the changes of a message over.

@@ -124,6 +124,37 @@ fn values_arrive_by_identifier_and_by_path_and_a_bad_status_is_absence() {
     );
 }
 
+/// A text of 2 MiB comes with other values: it is refused, and they are published.
+#[test]
+fn a_text_that_is_too_long_takes_no_other_value_with_it() {
+    let Some(python) = interpreter("opcua long text") else {
+        return;
+    };
+    let port = free_port();
+    let values = json!({"values": {"X": 0.0, "T": 20.0, "L": "short"}});
+    let mut machine = Machine::start(&python, port, &["urn:abbe:machine"], &values);
+    let map = format!("{MAP}  /Machine/L: {{is: text, name: note}}\n");
+    let mut bridge = open(&config(port), &map);
+    let mut begun = BTreeSet::new();
+    heard(&mut bridge, |output| {
+        begun.extend(value(output).map(|value| value.text.clone()));
+        ["20", "short"].iter().all(|text| begun.contains(*text))
+    });
+    let at = 1_480_411_730_000_000_000_i64;
+    let long = "n".repeat(2 << 20);
+    machine.tell(&json!({"rows": [["L", long, at], ["T", 33.5, at], ["X", 12.5, at]]}));
+    let (mut is_refused, mut is_heard) = (false, false);
+    heard(&mut bridge, |output| {
+        is_refused |= is_condition(output, "refused_value", "/Machine/L");
+        is_heard |= is_text(output, "33.5");
+        is_refused && is_heard
+    });
+    machine.tell(&json!({"rows": [["L", "m".repeat(60_000), at + 1_000_000]]}));
+    heard(&mut bridge, |output| {
+        value(output).is_some_and(|value| value.text.len() == 60_000)
+    });
+}
+
 /// Names of ten nodes, and a mapping of them.
 fn flood() -> (Vec<String>, String) {
     let names: Vec<String> = (0..10).map(|n| format!("V{n}")).collect();

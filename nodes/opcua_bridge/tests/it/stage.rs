@@ -390,7 +390,9 @@ fn what_is_left_out_is_counted_and_said() {
     let said = conditions(&bridge.io(IoEvent::Lost { from: 7, count: 2 }));
     assert_eq!(
         said,
-        ["sequence_gap: 2 messages of the server lost, from number 7 on; 2 so far"]
+        [
+            "sequence_gap: 2 messages of the server lost, from number 7 on; 2 so far. Every node is read again; changes between are missing"
+        ]
     );
     let said = conditions(&bridge.io(IoEvent::Dropped { count: 4 }));
     assert!(said[0].contains("4 messages came faster"), "{said:?}");
@@ -555,4 +557,39 @@ fn a_server_that_shows_another_unit_than_the_mapping_is_named_until_it_agrees() 
     let said = again(&[]);
     assert_eq!(said.len(), 1, "{said:?}");
     assert!(said[0].ends_with("are the mapping's unit"), "{said:?}");
+}
+
+#[test]
+fn an_endpoint_has_a_host_and_a_port_and_no_user() {
+    let tried = |endpoint: &str| {
+        let config = BridgeConfig {
+            endpoint: endpoint.to_owned(),
+            ..config()
+        };
+        let settings = Settings::new(&config, &MapFile::from_yaml(MAP).unwrap());
+        settings.err().map(|error| error.to_string())
+    };
+    for good in [
+        "opc.tcp://mill:4840",
+        "opc.tcp://[::1]:4840/a/b",
+        "opc.tcp://mill",
+        "opc.tcp://[::1]/",
+    ] {
+        assert_eq!(tried(good), None, "{good}");
+    }
+    for bad in [
+        "opc.tcp://mill:99999",
+        "opc.tcp://mill:0/",
+        "opc.tcp://mill:",
+        "opc.tcp://:4840",
+        "http://mill:80",
+    ] {
+        let said = tried(bad).unwrap();
+        assert!(said.contains(bad) && said.contains("1 to 65535"), "{said}");
+    }
+    let said = tried("opc.tcp://anna:secret@mill:4840/").unwrap();
+    assert!(
+        said.contains("security.user") && !said.contains("secret"),
+        "{said}"
+    );
 }
