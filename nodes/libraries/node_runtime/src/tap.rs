@@ -70,6 +70,13 @@ pub enum TapEvent {
         /// The other type.
         found: String,
     },
+    /// A topic has writers whose definitions of its type differ; all are listened to.
+    HashesDiffer {
+        /// Which.
+        topic: Arc<TappedTopic>,
+        /// The other hash.
+        found: String,
+    },
     /// A sample came.
     Sample(Tapped),
     /// A sample is no plain CDR.
@@ -293,12 +300,11 @@ async fn look(
             let Some((topic, types)) = found.get_mut(&name) else {
                 continue;
             };
-            for writer in writers {
-                if !types.contains(&writer.dds_type) {
-                    types.push(writer.dds_type.clone());
-                    let (topic, found) = (Arc::clone(topic), writer.dds_type.clone());
-                    let _ = queue.send(TapEvent::TypesDiffer { topic, found }).await;
-                }
+            for differs in writers
+                .iter()
+                .filter_map(|writer| differing(topic, types, writer))
+            {
+                let _ = queue.send(differs).await;
             }
         }
         tokio::select! {
@@ -314,6 +320,27 @@ async fn look(
     // Each ends by itself, as soon as the callback has room for its last sample.
     while readers.join_next().await.is_some() {}
     participant
+}
+
+/// That a writer has another type than its topic, or another definition of it; once for each of `known`.
+fn differing(
+    topic: &Arc<TappedTopic>,
+    known: &mut Vec<String>,
+    writer: &Remote,
+) -> Option<TapEvent> {
+    let topic = Arc::clone(topic);
+    if !known.contains(&writer.dds_type) {
+        known.push(writer.dds_type.clone());
+        let found = writer.dds_type.clone();
+        return Some(TapEvent::TypesDiffer { topic, found });
+    }
+    let is_type = known.first() == Some(&writer.dds_type);
+    let found = writer.type_hash.clone().filter(|_| is_type)?;
+    if topic.type_hash.as_ref()? == &found || known.contains(&found) {
+        return None;
+    }
+    known.push(found.clone());
+    Some(TapEvent::HashesDiffer { topic, found })
 }
 
 async fn tell_unmatched(patterns: Vec<String>, queue: &mpsc::Sender<TapEvent>) {
@@ -434,5 +461,41 @@ mod tests {
         let both = common_qos(&[&strong, &weak]);
         let expected = (Reliability::BestEffort, Durability::Volatile);
         assert_eq!((both.reliability, both.durability), expected);
+    }
+
+    #[test]
+    fn another_type_and_another_definition_are_each_found_once() {
+        let writer = |dds_type: &str, type_hash: Option<&str>| Remote {
+            guid: [0; 16],
+            node: String::new(),
+            role: Role::Message,
+            name: "/x".to_owned(),
+            dds_type: dds_type.to_owned(),
+            type_hash: type_hash.map(str::to_owned),
+            reliable: true,
+            latched: false,
+        };
+        let topic = Arc::new(TappedTopic {
+            name: "/x".to_owned(),
+            type_name: "t".to_owned(),
+            type_hash: Some("RIHS01_a".to_owned()),
+            qos: Qos::RELIABLE,
+        });
+        let mut known = vec!["t".to_owned()];
+        let mut seen = |dds_type: &str, hash: Option<&str>| match differing(
+            &topic,
+            &mut known,
+            &writer(dds_type, hash),
+        ) {
+            Some(TapEvent::TypesDiffer { found, .. }) => format!("type {found}"),
+            Some(TapEvent::HashesDiffer { found, .. }) => format!("hash {found}"),
+            _ => String::new(),
+        };
+        assert_eq!(seen("t", None), "");
+        assert_eq!(seen("t", Some("RIHS01_a")), "");
+        assert_eq!(seen("t", Some("RIHS01_b")), "hash RIHS01_b");
+        assert_eq!(seen("t", Some("RIHS01_b")), "");
+        assert_eq!(seen("u", Some("RIHS01_c")), "type u");
+        assert_eq!(seen("u", Some("RIHS01_c")), "");
     }
 }

@@ -158,6 +158,14 @@ impl Scribe {
                 let word = format!("{name}: somebody publishes {found}: only {first} is recorded");
                 self.troubles.topics().push(word);
             }
+            TapEvent::HashesDiffer { topic, found } => {
+                let (name, type_name) = (&topic.name, &topic.type_name);
+                let first = topic.type_hash.as_deref().unwrap_or_default();
+                let word = format!(
+                    "{name}: somebody publishes {type_name} with the hash {found}, others with {first}: all is recorded as the latter; build both from the same definition"
+                );
+                self.troubles.topics().push(word);
+            }
             TapEvent::Left {
                 topic,
                 samples,

@@ -47,7 +47,8 @@ impl End<'_> {
         // name, type and hash, so that they would be missed in silence.
         let own_hash = own_hash(self.release, self.dds_type);
         let by = if other.node.is_empty() {
-            String::new()
+            let guid = other.guid.map(|byte| format!("{byte:02x}")).join("");
+            format!(" of a program without a node's name, GUID {guid}")
         } else {
             format!(" of {}", other.node)
         };
@@ -243,13 +244,19 @@ mod tests {
         assert_eq!(end.complaints(&other), (None, None));
         other.type_hash = Some("RIHS01_00".to_owned());
         let of_hash = end.complaints(&other).0.unwrap();
-        assert!(of_hash.contains("RIHS01_00 there"), "{of_hash}");
+        assert!(
+            of_hash.contains("RIHS01_00 there of a program"),
+            "{of_hash}"
+        );
         other.latched = false;
         other.dds_type = "std_msgs::msg::dds_::String_".to_owned();
         let (of_type, of_qos) = end.complaints(&other);
         assert_eq!(
             of_type.unwrap(),
-            "/latency: expected abbe_msgs/msg/ProbeLatency, found std_msgs/msg/String"
+            format!(
+                "/latency: expected abbe_msgs/msg/ProbeLatency, found std_msgs/msg/String of a program without a node's name, GUID {}",
+                "00".repeat(16)
+            )
         );
         other.node = "/shop/scale".to_owned();
         let of_type = end.complaints(&other).0.unwrap();
