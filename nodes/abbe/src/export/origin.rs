@@ -89,7 +89,7 @@ pub(super) struct Origin {
     pub began_nanos: Option<u64>,
     /// Namespaces of the bag's topics, without the root.
     pub namespaces: Vec<String>,
-    /// By axis.
+    /// Of each axis, the first and the last positioning table in the bag, and how many.
     pub tables: PerAxis<Option<Tables>>,
     /// Models of [`MODELS`]: how many, and the log time of the last, ns.
     pub models: [Option<(u64, u64)>; 3],

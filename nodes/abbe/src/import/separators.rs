@@ -1,4 +1,4 @@
-//! What is wrong with lines of a table that do not come apart as its names do.
+//! Finds rows of a table that do not split into as many cells as its header line, and columns by name or number.
 
 use std::path::Path;
 

@@ -33,10 +33,10 @@ pub struct Validity {
 }
 
 impl Validity {
-    /// From an hour ago, for computers whose clocks are behind, for some days.
+    /// Valid from an hour before now, for computers whose clocks are behind, until so many days after now.
     ///
     /// # Errors
-    /// When the calendar ends.
+    /// When that day is beyond the calendar.
     pub fn from_now(now: DateTime<Utc>, days: u32) -> Result<Self> {
         let until = now.checked_add_signed(TimeDelta::days(days.into()));
         Ok(Self {

@@ -72,7 +72,7 @@ pub struct File {
 }
 
 impl File {
-    /// Looks at name and keys.
+    /// The kind of a file: by its name, else by its keys at the top level.
     pub fn named(path: &Path) -> Self {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let stem = name.trim_end_matches(".yaml");

@@ -214,3 +214,19 @@ fn a_scenario_of_two_nodes_of_one_name_or_of_an_empty_bag_is_a_mistake() {
         assert!(said.contains(words), "{words}: {said}");
     }
 }
+
+#[test]
+fn a_mistake_that_a_node_finds_has_its_file_and_line() {
+    let folder = spoiled(
+        "first_run",
+        &[(
+            "thermal_model.yaml",
+            "sensor: spindle_front",
+            "sensor: spindel_front",
+        )],
+    );
+    let findings = found(folder.path());
+    let said = findings.mistakes.join("\n");
+    assert!(said.contains("thermal_model.yaml:10:"), "{said}");
+    assert!(said.contains("load.sensor = \"spindel_front\""), "{said}");
+}

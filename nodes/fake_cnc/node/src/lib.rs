@@ -1,7 +1,7 @@
 //! ROS shell of the fake machine.
 
 use abbe_msgs::topics;
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
 use fake_cnc::{Cnc, Config, Input, Output};
 use machine::MachineFile;
 use metrology::stamp::Span;
@@ -33,8 +33,8 @@ pub fn witnessed(setup: &Setup, witness: Option<Witness>) -> Result<Box<dyn Node
     let of_machine = path.display().to_string();
     let machine = MachineFile::parse(&text, &of_machine)?;
     let plant = plant_file::plant(setup, &machine)?;
-    let cnc = Cnc::new(&config, &machine, plant)
-        .map_err(|error| anyhow!("{}", setup.placed(&error.to_string())))
+    let cnc = setup
+        .built(Cnc::new(&config, &machine, plant))
         .with_context(|| format!("with the machine file {of_machine}"))?
         .inactive();
     let period = Span::from_secs_f64(machine.control.servo_period_ms / 1e3);

@@ -204,7 +204,7 @@ impl Frame {
         PerAxis::from_fn(|axis| turned[axis] + self.origin[axis])
     }
 
-    /// Coordinates of the program at a point of the machine.
+    /// Coordinates of the program at a point of the machine, mm and rad: the inverse of `machine`.
     #[must_use]
     pub fn program(&self, machine: &PerAxis<f64>) -> PerAxis<f64> {
         let from_origin = PerAxis::from_fn(|axis| machine[axis] - self.origin[axis]);

@@ -1,4 +1,4 @@
-//! Diagnoses on a thread of their own, so that samples are taken while one is made.
+//! Runs each diagnosis on a thread of its own, so that the node goes on taking samples meanwhile.
 
 use std::thread::JoinHandle;
 

@@ -26,7 +26,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
-    let stage = GapDiagnosisStage::new(&config, &machine)?;
+    let stage = setup.built(GapDiagnosisStage::new(&config, &machine))?;
     let mut wiring = Wiring::new(setup.name(), parameters, Beside::new(stage))
         .live(Beside::begin)
         .on(&topics::AXES_STATE, |s| Input::Sample(State(s)))

@@ -17,7 +17,7 @@ const TELL: Span = Span::from_nanos(1_000_000_000);
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: HostClockConfig = setup.config()?;
     let parameters = setup.resolved(&config)?;
-    let stage = HostClockStage::new(&config)?;
+    let stage = setup.built(HostClockStage::new(&config))?;
     let table = Wiring::new(setup.name(), parameters, stage).keeps_own_time();
     if config.is_reference() {
         return Ok(table

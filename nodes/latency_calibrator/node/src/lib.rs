@@ -19,7 +19,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
-    let stage = LatencyCalibratorStage::new(&config, &machine)?;
+    let stage = setup.built(LatencyCalibratorStage::new(&config, &machine))?;
     Ok(Wiring::new(setup.name(), parameters, stage)
         .saved()
         .on(&topics::AXES_STATE, Input::State)

@@ -71,7 +71,7 @@ pub struct NoEpochTime {
     pub least: i64,
     /// Greatest value that is allowed, s.
     pub greatest: i64,
-    /// The greatest as a date.
+    /// The greatest value in words, for the message: "2106-02-07", or what it is less by.
     pub end: &'static str,
 }
 

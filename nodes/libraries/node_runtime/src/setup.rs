@@ -316,6 +316,25 @@ impl Setup {
         }
     }
 
+    /// What was built of the parameters. A reason that begins with the name of a parameter gets file, line and column in front.
+    ///
+    /// # Errors
+    /// The reason.
+    pub fn built<T, E>(&self, built: Result<T, E>) -> anyhow::Result<T>
+    where
+        E: std::error::Error + Send + Sync + 'static,
+    {
+        built.map_err(|error| {
+            let message = error.to_string();
+            let placed = self.placed(&message);
+            if placed == message {
+                error.into()
+            } else {
+                anyhow::anyhow!(placed)
+            }
+        })
+    }
+
     fn where_not_set(&self) -> String {
         match self.files() {
             files if self.origins.is_empty() => format!("{files} (its default)"),

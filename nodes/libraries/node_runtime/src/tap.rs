@@ -58,7 +58,7 @@ pub struct Tapped {
     pub bytes: Bytes,
 }
 
-/// What a tap tells.
+/// What a tap reports: a topic that was found, a sample, or what is wrong with either.
 #[derive(Clone, Debug)]
 pub enum TapEvent {
     /// A topic was found, and is listened to from now on.

@@ -70,7 +70,7 @@ fn runs(test: &LinearTest, periods_mm: Vec<f64>, measured: &Measured) -> Positio
 /// Least share of an axis in a line at which its periods count.
 const LEAST_SHARE: f64 = 0.1;
 
-/// Linear axes whose periods count along the line of a test.
+/// Linear axes that move along the line of a test: their leads and scale signals may show as periods of its error.
 pub fn axes_along(test: &LinearTest) -> Vec<Axis> {
     let has_share = |axis: &Axis| test.direction[axis.index()].abs() >= LEAST_SHARE;
     Axis::LINEAR.into_iter().filter(has_share).collect()

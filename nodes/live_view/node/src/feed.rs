@@ -125,7 +125,7 @@ impl Feed {
         }
     }
 
-    /// Appends the inputs since the last call, each with its time of receipt.
+    /// Empties the feed into `out`: each waiting input with its time of receipt and, stamped `now`, how many were left out.
     pub fn hand_over(&self, now: Stamp<Host>, out: &mut Vec<(Stamp<Host>, Input)>) {
         let waited = std::mem::take(&mut *self.waiting());
         for sample in waited.each {

@@ -19,7 +19,9 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
-    let stage = MachineFramesStage::new(&config, &machine, |name| setup.frame(name))?;
+    let stage = setup.built(MachineFramesStage::new(&config, &machine, |name| {
+        setup.frame(name)
+    }))?;
     Ok(Wiring::new(setup.name(), parameters, stage)
         .on(&topics::JOINT_STATES, Input::Joints)
         .every(TICK, || Input::Tick)

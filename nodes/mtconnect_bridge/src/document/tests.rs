@@ -1,4 +1,4 @@
-//! Answers of agents, by hand.
+//! Tests of the parser on answers of agents that were written by hand.
 
 use super::*;
 use proptest::prelude::*;

@@ -59,7 +59,7 @@ pub(super) struct FileIndex {
     pub attachments: Vec<AttachmentPlace>,
     pub metadata: Vec<MetadataRecord>,
     pub span: TimeSpan,
-    /// Where and why walking through the file came to an end before the file's own.
+    /// Byte at which the walk through a damaged file stopped, and why; `None`: it came to the end record.
     pub end_loss: Option<(u64, LossReason)>,
     /// The file has an end, but its index cannot be used.
     pub index_damaged: bool,

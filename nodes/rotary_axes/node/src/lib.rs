@@ -21,7 +21,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
-    let stage = RotaryAxesStage::new(&config, &machine)?;
+    let stage = setup.built(RotaryAxesStage::new(&config, &machine))?;
     Ok(Wiring::new(setup.name(), parameters, stage)
         .saved()
         .on(&topics::PROBE_FEATURE, Input::Feature)

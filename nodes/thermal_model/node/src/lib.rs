@@ -21,7 +21,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
-    let stage = ThermalModelStage::new(config, &machine)?;
+    let stage = setup.built(ThermalModelStage::new(config, &machine))?;
     let mut wiring = Wiring::new(setup.name(), parameters, stage)
         .saved()
         .on(&topics::BLOCKS_MEASUREMENT, Input::Block)

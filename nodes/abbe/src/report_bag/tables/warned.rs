@@ -1,4 +1,4 @@
-//! Warnings of dead instruments are on the page of a table.
+//! Tests: the page of an imported table warns of an instrument that does not follow.
 
 use tempfile::TempDir;
 

@@ -53,11 +53,11 @@ impl Output {
     }
 }
 
-/// Refuses outputs that are an input, replace what is no output of their kind, or go to one place; an empty file is a place
-/// that was made for one.
+/// Refuses an output that is an input, would replace a file of another kind, or has the path of another output. An empty file
+/// may be replaced.
 ///
 /// # Errors
-/// With option, file and remedy.
+/// The option, the file and what to do instead.
 pub fn check_outputs<'p>(
     outputs: &[Output],
     inputs: impl IntoIterator<Item = &'p Path>,

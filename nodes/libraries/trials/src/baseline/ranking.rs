@@ -4,7 +4,14 @@
 //!   R2_g = max over forms of b' G^-1 b / z'z                              (1)
 //! ```
 //!
-//! The greatest is named where its gain is more than its price; a ballbar's ranking names one in any case, and would
+//! | symbol | here |
+//! |---|---|
+//! | z | whitened rows, set-ups floated |
+//! | b | inner products of the form's columns with z |
+//! | G | inner products of the columns with each other |
+//!
+//! b' G^-1 b is the gain in chi-square. The effect with the greatest is named where that is more than the form's price
+//! (`Regression::price`, chi-square); a ballbar's ranking names one in any case, and would
 //! name one on every healthy machine.
 
 use std::collections::BTreeSet;

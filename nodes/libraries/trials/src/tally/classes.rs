@@ -25,7 +25,7 @@ pub struct ClassLine {
     pub d_range: [f64; 2],
     /// Shown as a surrogate with its axis, over all D.
     pub surrogate: Proportion,
-    /// Its 95 % interval.
+    /// 95 % interval (Wilson) of the share in `surrogate`, 0 to 1.
     pub surrogate_interval: [f64; 2],
     /// What else was named in those trials that hide it alone, the most frequent first.
     pub taken_for: Vec<(String, usize)>,
