@@ -35,7 +35,7 @@ const VOCABULARY: [&str; 6] = [
 
 /// Libraries that are not for every node, with the only crates that may depend on each.
 const USERS: [(&str, &[&str]); 5] = [
-    ("iso230", &["reports", "abbe"]),
+    ("iso230", &["reports", "abbe", "abbe_fuzz"]),
     (
         "machine_report",
         &["mtconnect_bridge", "opcua_bridge", "opcua_bridge_node"],

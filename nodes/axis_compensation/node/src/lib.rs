@@ -26,9 +26,8 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let parameters = setup.resolved(&config)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
-    let stage = setup
-        .built(AxisCompensationStage::new(&config, &machine))?
-        .inactive();
+    let built = setup.built(AxisCompensationStage::new(&config, &machine))?;
+    let stage = built.inactive();
     let fresh = stage.clone();
     let wind_down = Span::from_secs_f64(config.wind_down_s() + BUSY_S);
     let at_rest = |output: &Output| *output == Output::AtRest;
