@@ -15,7 +15,7 @@
 //!   c = -K e + f dr/dt,    de/dt = v - dr/dt                              (3)
 //!   dv/dt = 2 d w (c - u) + z,   dz/dt = w^2 (c - u)                      (4)
 //!   du/dt = (v - u) / t;   u = v where t is 0                             (5)
-//!   e = -(1 - f) r' / K + [(1 - f) / K^2 + f t / K] r'' - f r''' / (w^2 K) + ..  (6)
+//!   e = -(1 - f) r' / K + [(1 - f) / K^2 + t / K] r'' - f r''' / (w^2 K) + ..    (6)
 //! ```
 //!
 //! | symbol | here | unit |
@@ -77,8 +77,8 @@ impl Effect for Following {
 }
 
 impl Motion {
-    /// Lets the axes go as the loops of a machine file make them. What has inertia yields to that acceleration: where the
-    /// command's changes within the loops' time, it is another one.
+    /// Computes the acceleration of each axis behind its control loops, to which what has inertia yields. It differs from the
+    /// command's where that changes faster than the loops can follow.
     pub fn follow(&mut self, machine: &MachineFile) {
         for (axis, entry) in &machine.axes {
             if self.position[*axis].is_empty() {
@@ -91,7 +91,7 @@ impl Motion {
                     let (begin, change) = within(self, *axis, tick, step_s);
                     follower.advance(begin, change, step_s);
                 }
-                follower.acceleration()
+                follower.acceleration(self.acceleration[*axis][tick])
             });
             self.driven[*axis] = each.collect();
         }
@@ -217,15 +217,15 @@ impl Follower {
         self.state[VELOCITY]
     }
 
-    /// Acceleration of the motor.
-    pub(crate) fn acceleration(&self) -> f64 {
+    /// Acceleration of the motor, where the command has `of_command`.
+    fn acceleration(&self, of_command: f64) -> f64 {
         let state = &self.state;
         match &self.rate {
             Some(rate) => (rate.row(VELOCITY) * state)[0],
             // Of v = f r' - K e.
             None => {
                 let slower = state[VELOCITY] - state[COMMAND];
-                self.gains.feedforward * state[CHANGE] - self.gains.position_per_s * slower
+                self.gains.feedforward * of_command - self.gains.position_per_s * slower
             }
         }
     }

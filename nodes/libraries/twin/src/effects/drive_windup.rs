@@ -7,7 +7,7 @@
 //!   f = sgn(last motion) f_0 + f_1 v                                      (2)
 //! ```
 //!
-//! a is the axis' own acceleration, as its loops make it. x is the place within the travel, -1 to 1: a screw that is held at one end is softer at the other. The screw drags the
+//! a is the acceleration of the axis behind its control loops. x is the place within the travel, -1 to 1: a screw that is held at one end is softer at the other. The screw drags the
 //! slide through the friction of its guides as well: f is `guide_friction` of the machine file, zero where it tells none.
 //!
 //! | symbol | here | unit |

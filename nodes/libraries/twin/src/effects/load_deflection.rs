@@ -2,8 +2,8 @@
 //!
 //! # Model
 //!
-//! The force that every recording contains is the inertia of what an axis accelerates, as its loops make it go. The frame gives
-//! way against it, far below its first resonance in proportion:
+//! The force that every recording contains is the inertia of what an axis accelerates, behind its control loops. The frame
+//! gives way against it, far below its first resonance in proportion:
 //!
 //! ```text
 //!   tip = -(m/k) a = -a / w0 2                                            (1)

@@ -88,6 +88,31 @@ fn val_the_loop_with_its_velocity_loop_integrated_finely() {
     assert!(greatest(added) > 1e-3, "the velocity loop must be seen");
 }
 
+/// Round a circle an axis behind an ideal velocity loop accelerates as its command does, within the phase of the loop.
+#[test]
+fn eq2_an_axis_behind_an_ideal_loop_accelerates_as_the_loop_in_closed_form() {
+    let machine = bench();
+    let (radius_mm, feed_mm_s) = (50.0, 100.0);
+    let mut run = circle(radius_mm, feed_mm_s, 1.0);
+    run.motion.follow(&machine);
+    let x = machine.linear(Axis::X).unwrap();
+    let (gain, share) = (x.position_gain_per_s, x.velocity_feedforward);
+    let rate = feed_mm_s / radius_mm;
+    // x = G r, G = (K + i w f) / (K + i w).
+    let size = gain * gain + rate * rate;
+    let (along, across) = (
+        (gain * gain + share * rate * rate) / size,
+        (share - 1.0) * rate * gain / size,
+    );
+    let most = radius_mm * rate * rate;
+    let off = (500..run.motion.len() - 2).map(|k| {
+        let (sin, cos) = (rate * run.motion.time_s[k]).sin_cos();
+        run.motion.driven[Axis::X][k] + most * (along * cos - across * sin)
+    });
+    let off = greatest(off);
+    assert!(off < 1e-3 * most, "{off} of {most}");
+}
+
 /// A command that turns round sharply, as at a corner: its acceleration is there for less than the loops' time.
 #[test]
 fn val_a_motor_accelerates_as_its_loop_integrated_finely() {
@@ -167,8 +192,7 @@ fn eq6_a_velocity_loop_adds_a_share_of_acceleration_and_jerk() {
             let (sin, cos) = (rate * run.motion.time_s[k]).sin_cos();
             let acceleration = -radius_mm * rate.powi(2) * cos;
             let jerk = radius_mm * rate.powi(3) * sin;
-            let expected =
-                share * (filter_ms * 1e-3 / gain * acceleration - jerk / (square * gain));
+            let expected = filter_ms * 1e-3 / gain * acceleration - share * jerk / (square * gain);
             response.servo[Axis::X][k] - ideal.servo[Axis::X][k] - expected
         });
         let off_um = greatest(off) * 1e3;
