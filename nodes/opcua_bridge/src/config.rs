@@ -186,10 +186,6 @@ pub struct Settings {
 pub fn checked_endpoint(endpoint: &str) -> Result<String, BridgeError> {
     let rest = endpoint.strip_prefix("opc.tcp://");
     let place = rest.map(|rest| rest.split('/').next().unwrap_or_default());
-    if let Some((_, host)) = place.and_then(|place| place.rsplit_once('@')) {
-        let host = host.to_owned();
-        return Err(BridgeError::UserInEndpoint { host });
-    }
     let is_port = |port: &str| port.parse::<u16>().is_ok_and(|port| port > 0);
     let is_place = place.is_some_and(|place| match place.rsplit_once(':') {
         // The colons of [::1] are no port's.
@@ -197,7 +193,15 @@ pub fn checked_endpoint(endpoint: &str) -> Result<String, BridgeError> {
         _ => !place.is_empty(),
     });
     let is_word = endpoint.bytes().all(|byte| byte.is_ascii_graphic());
-    if is_place && is_word && endpoint.len() <= 4096 {
+    let has_user = place.is_some_and(|place| place.contains('@'));
+    let is_url = is_place && is_word && endpoint.len() <= 4096;
+    if let Some((_, host)) = endpoint.rsplit_once('@')
+        && (has_user || !is_url)
+    {
+        let host = host.to_owned();
+        return Err(BridgeError::UserInEndpoint { host });
+    }
+    if is_url {
         Ok(endpoint.to_owned())
     } else {
         let endpoint = endpoint.to_owned();

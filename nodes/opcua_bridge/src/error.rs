@@ -20,7 +20,7 @@ pub enum BridgeError {
     },
     /// The endpoint holds a user, and what holds it is shown in messages.
     #[error(
-        "endpoint: opc.tcp://…@{host} has a user, which messages would show: name it in security.user, with security.password_file"
+        "endpoint = \"…@{host}\": remove user and password, which messages would show, and use security.user and security.password_file"
     )]
     UserInEndpoint {
         /// What stands behind the user.

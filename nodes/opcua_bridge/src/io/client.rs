@@ -198,7 +198,7 @@ fn builder(settings: &Settings, folder: &Path) -> ClientBuilder {
         .request_timeout(duration(settings.reply_timeout))
         .max_message_size(MESSAGE_BYTES)
         .max_chunk_count(MESSAGE_BYTES / CHUNK_BYTES)
-        // What does not decode ends the connection: a text has the limit of its message, and above 65,536 bytes the stage refuses it.
+        // A text that cannot be decoded would end the connection. The stage refuses one above 65,536 bytes.
         .max_string_length(MESSAGE_BYTES)
         .max_byte_string_length(MESSAGE_BYTES)
         .max_array_length(ARRAY_LENGTH)

@@ -106,6 +106,8 @@ struct Visit<'a> {
     dropped: Arc<AtomicU64>,
     /// Marks of what each item sent last.
     sent: BTreeMap<usize, u64>,
+    /// Messages were lost since every node was read last.
+    has_lost: bool,
 }
 
 /// The same for the same value and status.
@@ -228,6 +230,7 @@ impl<'a> Visit<'a> {
             notes: receiver,
             dropped,
             sent: BTreeMap::new(),
+            has_lost: false,
         };
         let mut missing = found.missing;
         let granted = visit.monitor(found.nodes, &mut missing).await?;
@@ -360,14 +363,10 @@ impl<'a> Visit<'a> {
     /// Takes a message; what is missing before it is asked for again first.
     async fn take(&mut self, (at, message): Note) -> Option<IoEvent> {
         let dropped = self.dropped.swap(0, Ordering::Relaxed);
-        if dropped > 0 {
-            let ended = self.send(IoEvent::Dropped { count: dropped });
-            if ended.is_some() {
-                return ended;
-            }
-            if let Some(ended) = self.read_again(|is_as_sent| !is_as_sent).await {
-                return Some(ended);
-            }
+        if dropped > 0
+            && let Some(ended) = self.send(IoEvent::Dropped { count: dropped })
+        {
+            return Some(ended);
         }
         let data = message.notification_data.as_ref();
         let has_data = data.is_some_and(|data| !data.is_empty());
@@ -380,7 +379,25 @@ impl<'a> Visit<'a> {
                 }
             }
         }
-        self.hand_over(at, message)
+        if let Some(ended) = self.hand_over(at, message) {
+            return Some(ended);
+        }
+        self.catch_up().await
+    }
+
+    /// Reads every node once what waits is handed over, where messages were lost: what changed in them alone comes by nothing
+    /// else. A server that does not answer now is asked again after its next message.
+    async fn catch_up(&mut self) -> Option<IoEvent> {
+        if !self.has_lost || !self.notes.is_empty() {
+            return None;
+        }
+        match self.read_again(|is_as_sent| !is_as_sent).await {
+            Ok(ended) => {
+                self.has_lost = false;
+                ended
+            }
+            Err(_) => None,
+        }
     }
 
     /// Asks for messages again, and reports which are gone.
@@ -406,11 +423,8 @@ impl<'a> Visit<'a> {
         if lost == 0 {
             return None;
         }
-        if let Some(ended) = self.send(IoEvent::Lost { from, count: lost }) {
-            return Some(ended);
-        }
-        // What changed in them alone is told of by nothing else.
-        self.read_again(|is_as_sent| !is_as_sent).await
+        self.has_lost = true;
+        self.send(IoEvent::Lost { from, count: lost })
     }
 
     /// The session was taken up again: what was missed is asked for, then what holds is read.
@@ -437,25 +451,33 @@ impl<'a> Visit<'a> {
             return Some(ended);
         }
         // What is another than was sent last waits in the subscription, and comes in its order.
-        self.read_again(|is_as_sent| is_as_sent).await
+        let read = self.read_again(|is_as_sent| is_as_sent).await;
+        read.unwrap_or_else(|error| Some(ended(error)))
     }
 
-    /// Reads every node, and hands those over that are as they were sent last, or those that are not.
-    async fn read_again(&self, is_wanted: fn(bool) -> bool) -> Option<IoEvent> {
-        for chunk in self.nodes.chunks(NODES_CHUNK) {
-            let values = match self.read(chunk).await {
-                Ok(values) => values,
-                Err(error) => return Some(ended(error)),
-            };
-            let held = chunk.iter().zip(values);
-            let held = held.map(|((item, _), value)| change(*item, value, true));
-            let held =
-                held.filter(|change| is_wanted(self.sent.get(&change.item) == Some(&mark(change))));
-            if let Some(ended) = self.send(IoEvent::Changed(held.collect())) {
-                return Some(ended);
+    /// Reads every node, and hands those over that are as they were sent last, or those that are not; the end where nobody
+    /// listens.
+    async fn read_again(&mut self, is_wanted: fn(bool) -> bool) -> Result<Option<IoEvent>, Error> {
+        for begin in (0..self.nodes.len()).step_by(NODES_CHUNK) {
+            let end = (begin + NODES_CHUNK).min(self.nodes.len());
+            let values = self.read(&self.nodes[begin..end]).await?;
+            let items = self.nodes[begin..end].iter().map(|(item, _)| *item);
+            let held = items
+                .zip(values)
+                .map(|(item, value)| change(item, value, true));
+            let mut wanted: Vec<Change> = Vec::new();
+            for change in held {
+                let mark = mark(&change);
+                if is_wanted(self.sent.get(&change.item) == Some(&mark)) {
+                    self.sent.insert(change.item, mark);
+                    wanted.push(change);
+                }
+            }
+            if let Some(ended) = self.send(IoEvent::Changed(wanted)) {
+                return Ok(Some(ended));
             }
         }
-        None
+        Ok(None)
     }
 
     /// Values of some nodes. Where the answer is too long they are read one by one, and a value that is too long by itself is

@@ -162,7 +162,7 @@ impl Scribe {
                 let (name, type_name) = (&topic.name, &topic.type_name);
                 let first = topic.type_hash.as_deref().unwrap_or_default();
                 let word = format!(
-                    "{name}: somebody publishes {type_name} with the hash {found}, others with {first}: all is recorded as the latter; build both from the same definition"
+                    "{name}: two definitions of {type_name}: {first} and {found}. All messages are recorded as {first}; build all nodes from one definition, or set ROS_DISTRO alike"
                 );
                 self.troubles.topics().push(word);
             }
