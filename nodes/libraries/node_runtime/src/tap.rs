@@ -322,12 +322,18 @@ async fn look(
     participant
 }
 
+/// Types and definitions of a topic that are reported; further ones are not.
+const MOST_DIFFERING: usize = 16;
+
 /// That a writer has another type than its topic, or another definition of it; once for each of `known`.
 fn differing(
     topic: &Arc<TappedTopic>,
     known: &mut Vec<String>,
     writer: &Remote,
 ) -> Option<TapEvent> {
+    if known.len() >= MOST_DIFFERING {
+        return None;
+    }
     let topic = Arc::clone(topic);
     if !known.contains(&writer.dds_type) {
         known.push(writer.dds_type.clone());
@@ -497,5 +503,11 @@ mod tests {
         assert_eq!(seen("t", Some("RIHS01_b")), "");
         assert_eq!(seen("u", Some("RIHS01_c")), "type u");
         assert_eq!(seen("u", Some("RIHS01_c")), "");
+        // Whoever announces without end is reported so often and no more.
+        let more = (0..1000).map(|n| seen("t", Some(&format!("RIHS01_{n}"))));
+        assert_eq!(
+            more.filter(|said| !said.is_empty()).count(),
+            MOST_DIFFERING - 3
+        );
     }
 }
