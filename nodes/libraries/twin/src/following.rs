@@ -259,7 +259,7 @@ impl Follower {
         let lag = change / step_s / gains.position_per_s;
         let steady = [begin - lag, begin + change - lag].map(|v| -gains.left_s() * v);
         let error = steady[1] + (self.state[ERROR] - steady[0]) * self.kept; // (1)
-        (self.state[COMMAND], self.state[CHANGE]) = (begin + change, change / step_s);
+        self.state[COMMAND] = begin + change;
         self.state[ERROR] = error;
         self.state[VELOCITY] = gains.feedforward * (begin + change) - gains.position_per_s * error;
     }
