@@ -144,6 +144,14 @@ fn bad_physics_is_refused_with_file_key_and_value() {
 }
 
 #[test]
+fn a_bridge_to_a_control_does_not_go_by_simulated_time() {
+    let scenario = Scenario::copy_of("linuxcnc_block_cycle");
+    let simulated = ["-p", "use_sim_time:=true"];
+    let words = ["use_sim_time = true", "must be false", "real time"];
+    refused(&scenario, "linuxcnc_bridge", &simulated, &words);
+}
+
+#[test]
 fn a_second_node_of_the_same_name_does_not_start_and_the_first_goes_on() {
     let (scenario, domain) = (Scenario::copy_of("first_run"), domain(6));
     let graph = Graph::join(domain);

@@ -1,14 +1,14 @@
 //! The stage together with its sockets: what the ROS shell drives.
 //!
 //! To its driver it is an ordinary stage that wants a tick every few milliseconds; each tick hands over all that
-//! has come from outside since the last, with the instants at which it came.
+//! has come from outside since the last, with the instants at which it came, by the node's clock.
 
 use std::convert::Infallible;
 
 use machine_report::ValueCondition;
 use machine_report::turns::Turns;
-use metrology::Stage;
 use metrology::stamp::{Host, Stamp};
+use metrology::{ArrivalClock, Stage};
 
 use crate::config::Settings;
 use crate::error::BridgeError;
@@ -37,6 +37,7 @@ pub struct LiveBridge {
     log: Option<LogFile>,
     said: Vec<Output>,
     waiting: Turns<Output>,
+    clock: ArrivalClock,
 }
 
 impl LiveBridge {
@@ -51,6 +52,7 @@ impl LiveBridge {
             log: None,
             said: Vec::new(),
             waiting: Turns::default(),
+            clock: ArrivalClock::default(),
         })
     }
 
@@ -63,6 +65,7 @@ impl LiveBridge {
             log: Some(log),
             said: Vec::new(),
             waiting: Turns::default(),
+            clock: ArrivalClock::default(),
         }
     }
 
@@ -74,6 +77,12 @@ impl LiveBridge {
         while self.stage.wants_log() {
             self.stage.read_log(log.read(), out);
         }
+    }
+
+    /// The same with what comes stamped by `clock`.
+    #[must_use]
+    pub fn stamped_by(self, clock: ArrivalClock) -> Self {
+        Self { clock, ..self }
     }
 
     fn pass(&mut self, at: Stamp<Host>, input: Input) -> Result<(), Infallible> {
@@ -94,7 +103,7 @@ impl LiveBridge {
     /// Takes events until they are many, or have much to say; whether the stage may take the time of the tick.
     ///
     /// It may not where what came is cut: a tick ends an instant, whose other positions may be in what was not taken.
-    fn listen(&mut self) -> Result<bool, Infallible> {
+    fn listen(&mut self, at: Stamp<Host>) -> Result<bool, Infallible> {
         let mut bytes = 0;
         for _ in 0..EVENTS_PER_TICK {
             if bytes > BYTES_PER_TICK || self.waiting.is_full() {
@@ -104,7 +113,7 @@ impl LiveBridge {
                 break;
             };
             bytes += length(&event);
-            self.pass(came_at, Input::Io(event))?;
+            self.pass(self.clock.shown(at, came_at), Input::Io(event))?;
         }
         Ok(true)
     }
@@ -138,7 +147,7 @@ impl Stage for LiveBridge {
         }
         self.read_log(out);
         // While much waits the machine waits too, and is not silent.
-        if self.waiting.is_empty() && self.listen()? {
+        if self.waiting.is_empty() && self.listen(at)? {
             self.pass(at, Input::Tick)?;
         }
         self.waiting.hand_over(out);
@@ -171,6 +180,7 @@ mod tests {
             log: None,
             said: Vec::new(),
             waiting: Turns::default(),
+            clock: ArrivalClock::default(),
         }
     }
 

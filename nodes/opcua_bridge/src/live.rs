@@ -1,14 +1,14 @@
 //! The stage together with its sockets: what the ROS shell drives.
 //!
 //! To its driver it is an ordinary stage that wants a tick every few milliseconds; each tick hands over all that
-//! has come from outside since the last, with the instants at which it came.
+//! has come from outside since the last, with the instants at which it came, by the node's clock.
 
 use std::convert::Infallible;
 
 use machine_report::ValueCondition;
 use machine_report::turns::Turns;
-use metrology::Stage;
 use metrology::stamp::{Host, Stamp};
+use metrology::{ArrivalClock, Stage};
 
 use crate::config::Settings;
 use crate::error::BridgeError;
@@ -34,6 +34,7 @@ pub struct LiveBridge {
     io: BridgeIo,
     said: Vec<Output>,
     waiting: Turns<Output>,
+    clock: ArrivalClock,
 }
 
 impl LiveBridge {
@@ -48,7 +49,14 @@ impl LiveBridge {
             io: BridgeIo::start(settings, credentials)?,
             said: Vec::new(),
             waiting: Turns::default(),
+            clock: ArrivalClock::default(),
         })
+    }
+
+    /// The same with what comes stamped by `clock`.
+    #[must_use]
+    pub fn stamped_by(self, clock: ArrivalClock) -> Self {
+        Self { clock, ..self }
     }
 
     fn pass(&mut self, at: Stamp<Host>, input: Input) -> Result<(), Infallible> {
@@ -65,7 +73,7 @@ impl LiveBridge {
     /// Takes events until they are many, or have much to say; whether the stage may take the time of the tick.
     ///
     /// It may not where what came is cut: a tick ends an instant, whose other positions may be in what was not taken.
-    fn listen(&mut self) -> Result<bool, Infallible> {
+    fn listen(&mut self, at: Stamp<Host>) -> Result<bool, Infallible> {
         for _ in 0..EVENTS_PER_TICK {
             if self.waiting.is_full() {
                 return Ok(false);
@@ -73,7 +81,7 @@ impl LiveBridge {
             let Some((came_at, event)) = self.io.event() else {
                 return Ok(true);
             };
-            self.pass(came_at, Input::Io(event))?;
+            self.pass(self.clock.shown(at, came_at), Input::Io(event))?;
         }
         Ok(false)
     }
@@ -99,7 +107,7 @@ impl Stage for LiveBridge {
             return Ok(());
         }
         // While much waits the machine waits too, and is not silent.
-        if self.waiting.is_empty() && self.listen()? {
+        if self.waiting.is_empty() && self.listen(at)? {
             self.pass(at, Input::Tick)?;
         }
         self.waiting.hand_over(out);

@@ -5,6 +5,7 @@
 //! actual minus commanded, of the tool relative to the workpiece; a *compensation* is what is added
 //! to the command. Axes follow ISO 841.
 
+pub mod arrival;
 pub mod axis;
 pub mod bound;
 pub mod clock_map;
@@ -28,6 +29,7 @@ pub mod text;
 pub mod visible;
 pub mod yaml;
 
+pub use arrival::ArrivalClock;
 pub use axis::{Axis, AxisSet, PerAxis};
 pub use bound::{Bound, BoundError, Range};
 pub use clock_map::ClockMap;

@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 use anyhow::Context;
 use metrology::number::{number, unit_of};
 use metrology::yaml::Place;
-use metrology::{ParameterDoc, parameters_of};
+use metrology::{ArrivalClock, ParameterDoc, parameters_of};
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -220,6 +220,16 @@ impl Setup {
     #[must_use]
     pub fn host_time(&self) -> HostTime {
         self.every.host_time.clone()
+    }
+
+    /// The clock by which this node stamps what it hears outside the graph. Where time is simulated that came when it is taken.
+    #[must_use]
+    pub fn arrival_clock(&self) -> ArrivalClock {
+        let (time, is_simulated) = (self.host_time(), self.use_sim_time());
+        ArrivalClock::new(move |taken_at, came_at| match is_simulated {
+            true => taken_at,
+            false => time.shown(came_at),
+        })
     }
 
     /// From where on the node's lines are said, where its logger is named on the command line.

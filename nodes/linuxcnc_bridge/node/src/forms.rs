@@ -5,12 +5,22 @@ use std::path::{Path, PathBuf};
 use abbe_msgs::action::{RunProgram, RunProgramFeedback, RunProgramGoal, RunProgramResult};
 use abbe_msgs::joint_state;
 use abbe_msgs::sensor_msgs::msg::JointState;
+use anyhow::{Result, bail};
 use linuxcnc_bridge::Output;
 use linuxcnc_bridge::condition::Condition;
 use linuxcnc_bridge::live::LiveInput;
 use linuxcnc_bridge::run::{Ending, Outcome};
 use metrology::sample::{AxisState, ProbeTrigger};
-use node_runtime::{Diagnostic, GoalSignal, GoalStatus, Level};
+use node_runtime::{Diagnostic, GoalSignal, GoalStatus, Level, Setup};
+
+/// Refuses a control that goes by `/clock`: where that rests or runs fast, no offset and no silence would be what it is taken for.
+pub(crate) fn refuse_simulated_time(setup: &Setup) -> Result<()> {
+    if setup.use_sim_time() {
+        let reason = "use_sim_time = true: must be false, since a control goes by real time";
+        bail!("{}", setup.placed(reason));
+    }
+    Ok(())
+}
 
 /// The folder to which `relative` is relative when it leads to `path`.
 pub(crate) fn folder_of(path: &Path, relative: &str) -> PathBuf {

@@ -21,17 +21,18 @@ const STOP: Span = Span::from_nanos(60_000_000_000);
 /// Builds the node; starts LinuxCNC where its parameters name an INI file.
 ///
 /// # Errors
-/// When a parameter or the machine file is wrong, or LinuxCNC cannot be started.
+/// When a parameter or the machine file is wrong, time is simulated, or LinuxCNC cannot be started.
 pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let config: BridgeConfig = setup.config()?;
     let parameters = setup.resolved(&config)?;
+    forms::refuse_simulated_time(setup)?;
     let (path, text) = setup.file_text("machine_file")?;
     let machine = MachineFile::parse(&text, &path.display().to_string())?;
     let folder = match &config.start_ini {
         Some(ini) => forms::folder_of(&setup.file_path("start_ini")?, ini),
         None => PathBuf::new(),
     };
-    let bridge = LiveBridge::prepare(&config, &machine, &folder)?;
+    let bridge = LiveBridge::prepare(&config, &machine, &folder)?.stamped_by(setup.arrival_clock());
     let at_rest = |output: &Output| *output == Output::AtRest;
     let lifecycle = Lifecycle::new(config.autostart, STOP, LiveInput::Active, at_rest)
         .configured(|bridge: &mut LiveBridge| bridge.open().map_err(|error| error.to_string()))

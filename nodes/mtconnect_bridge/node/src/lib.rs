@@ -36,7 +36,9 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
             let (file, length) = setup.file_opened("log_file")?;
             LiveBridge::of_log(&settings, LogFile::new(file, length))
         }
-        Source::Shdr | Source::Agent => LiveBridge::open(&settings)?,
+        Source::Shdr | Source::Agent => {
+            LiveBridge::open(&settings)?.stamped_by(setup.arrival_clock())
+        }
     };
     let mut wiring = Wiring::new(setup.name(), parameters, bridge)
         .every(TICK, || LiveInput::Tick)

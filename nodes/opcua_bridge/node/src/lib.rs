@@ -34,7 +34,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
     let map = MapFile::from_yaml(&text).map_err(|error| placed(&error))?;
     let settings = Settings::new(&config, &map).map_err(|error| placed(&error))?;
     let credentials = files::credentials(setup, &config.security)?;
-    let bridge = LiveBridge::open(&settings, credentials)?;
+    let bridge = LiveBridge::open(&settings, credentials)?.stamped_by(setup.arrival_clock());
     let mut wiring = Wiring::new(setup.name(), parameters, bridge)
         .every(TICK, || LiveInput::Tick)
         .diagnose(forms::condition)

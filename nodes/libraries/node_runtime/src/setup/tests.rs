@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use metrology::stamp::{Host, Stamp};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -56,6 +57,24 @@ fn file_and_command_line_make_one_configuration() {
     assert_eq!(served[0].value, Value::Integer(5));
     assert_eq!(served[2].value, Value::Double(20.0));
     assert_eq!(served[2].description, "How often. [Hz]");
+}
+
+#[test]
+fn what_comes_from_outside_is_stamped_by_the_clock_of_the_node() {
+    let at = |seconds: i64| {
+        Stamp::<Host>::from_nanos(1_700_000_000_000_000_000 + seconds * 1_000_000_000)
+    };
+    let error = "{offset_s: 90.0, drift_us_per_s: 0.0, since_s: 1700000000.0}";
+    let wrong = format!("clock_error:={error}");
+    for (arguments, wanted) in [
+        (&["-p", "use_sim_time:=false"][..], at(3)),
+        (&["-p", "use_sim_time:=false", "-p", &wrong], at(93)),
+        (&["-p", "use_sim_time:=true"], at(5)),
+    ] {
+        let (_folder, setup) = setup(GOOD, arguments);
+        let clock = setup.unwrap().arrival_clock();
+        assert_eq!(clock.shown(at(5), at(3)), wanted, "{arguments:?}");
+    }
 }
 
 #[test]
