@@ -12,9 +12,9 @@ use node_runtime::complain;
 use node_runtime::environment::Environment;
 use node_runtime::tap::Selection;
 use node_runtime::text_file;
-use node_runtime::{Interruption, Setup};
+use node_runtime::{HostTime, Interruption, Setup};
 use recorder::{ChunkCompression, NodeConfig, RecorderConfig, RecorderError, RingConfig};
-use recorder_node::Capture;
+use recorder_node::{Capture, Time};
 use reports::loss;
 
 use crate::alarm::Alarm;
@@ -59,6 +59,9 @@ pub struct Record {
     /// Save the ring when an error begins on `/diagnostics` too.
     #[arg(long, requires = "ring")]
     save_on_error: bool,
+    /// Stamp messages by `/clock`, as of a simulation or of `abbe play`, and not by this computer's clock.
+    #[arg(long)]
+    use_sim_time: bool,
     /// Absolute names of topics, `*` stands for any run of characters; none: every topic.
     #[arg(value_parser = topics)]
     topics: Vec<String>,
@@ -87,9 +90,10 @@ impl Record {
         });
         let machine = machine.transpose()?;
         if config.ring.is_some() {
-            return keep(&config, machine, &interruption);
+            return self.keep(&config, machine, &interruption);
         }
-        let capture = recorder_node::record(&config, machine, RECORDER_NAME)?;
+        let time = Time::of(self.use_sim_time, HostTime::default());
+        let capture = recorder_node::record(&config, machine, RECORDER_NAME, time)?;
         let bag = &config.bag;
         complain!("Recording into {bag}; Ctrl-C ends it.");
         let alarm = watch(&capture, &interruption)?;
@@ -151,7 +155,7 @@ impl Record {
             );
             return Err(refused("record", reason));
         }
-        Ok(NodeConfig {
+        let config = NodeConfig {
             bag: bag.to_owned(),
             bag_per_start: false,
             exclude: self.exclude.clone(),
@@ -159,7 +163,35 @@ impl Record {
             ring,
             topics,
             writing,
-        })
+        };
+        if self.use_sim_time {
+            recorder_node::check_clock(&config).map_err(|error| refused("record", error))?;
+        }
+        Ok(config)
+    }
+
+    /// Keeps the last minutes as the node `recorder`, whose services save them.
+    fn keep(
+        &self,
+        config: &NodeConfig,
+        machine: Option<String>,
+        interruption: &Interruption,
+    ) -> Result<ExitCode> {
+        let words = match self.use_sim_time {
+            true => &["--ros-args", "-p", "use_sim_time:=true"][..],
+            false => &[],
+        };
+        let words: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();
+        let setup = Setup::new(KEEPER, &Arguments::parse(words)?)?;
+        let node = recorder_node::listen(&setup, config, machine)?;
+        let running = node_runtime::launch(&Environment::read()?, vec![(setup, node)])?;
+        let words = "ros2 service call /recorder/save std_srvs/srv/Trigger";
+        complain!(
+            "Keeping what is said; `{words}` saves it below {}; Ctrl-C ends it.",
+            config.bag
+        );
+        running.until(interruption)?;
+        Ok(ExitCode::SUCCESS)
     }
 }
 
@@ -192,24 +224,6 @@ fn watch(capture: &Capture, interruption: &Interruption) -> Result<Option<Alarm>
     Ok(None)
 }
 
-/// Keeps the last minutes as the node `recorder`, whose services save them.
-fn keep(
-    config: &NodeConfig,
-    machine: Option<String>,
-    interruption: &Interruption,
-) -> Result<ExitCode> {
-    let setup = Setup::new(KEEPER, &Arguments::parse(Vec::new())?)?;
-    let node = recorder_node::listen(&setup, config, machine)?;
-    let running = node_runtime::launch(&Environment::read()?, vec![(setup, node)])?;
-    let words = "ros2 service call /recorder/save std_srvs/srv/Trigger";
-    complain!(
-        "Keeping what is said; `{words}` saves it below {}; Ctrl-C ends it.",
-        config.bag
-    );
-    running.until(interruption)?;
-    Ok(ExitCode::SUCCESS)
-}
-
 #[cfg(test)]
 mod tests {
     use clap::Parser;
@@ -238,6 +252,23 @@ mod tests {
         let record = CommandLine::parse_from(line).record;
         assert_eq!(record.exclude, ["/a", "/c*"]);
         assert_eq!(record.topics, ["/b", "*"]);
+    }
+
+    #[test]
+    fn simulated_time_needs_its_clock_among_the_topics() {
+        let of = |words: &[&str]| {
+            let line = ["record", "-o", "bag", "--use-sim-time"]
+                .iter()
+                .chain(words);
+            CommandLine::try_parse_from(line).unwrap().record.config()
+        };
+        for good in [&[][..], &["/axes/state", "/clock"], &["/c*"]] {
+            assert!(of(good).is_ok(), "{good:?}");
+        }
+        for bad in [&["/axes/state"][..], &["--exclude", "/clock"]] {
+            let said = of(bad).unwrap_err().to_string();
+            assert!(said.contains("add it to topics"), "{bad:?}: {said}");
+        }
     }
 
     #[test]

@@ -15,7 +15,7 @@ use node_runtime::names::NodeNames;
 use node_runtime::tap::{Selection, TapEvent};
 use node_runtime::{HostTime, Interruption, Node, Running, Setup};
 use recorder::Recorder;
-use recorder_node::Capture;
+use recorder_node::{Capture, Time};
 
 use super::{INTERRUPTED, NOT_RECORDED, Outcome, bag};
 use crate::alarm::Alarm;
@@ -61,7 +61,7 @@ pub fn run(
         &NodeNames::new(TAP, &[])?,
         Selection::All.without(scenario.file.recording.exclude.clone()),
         recorder,
-        HostTime::default(),
+        Time::default(),
         move |event| {
             if let TapEvent::Sample(sample) = event {
                 if let Some(receiver) = &mut receiver {

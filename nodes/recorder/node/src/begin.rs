@@ -2,14 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
+use abbe_msgs::topics;
 use anyhow::{Context, Result, bail};
+use node_runtime::Setup;
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::tap::Selection;
-use node_runtime::{HostTime, Setup};
 use recorder::{Directory, NodeConfig, Recorder, RecorderError, Recording, RunContext};
 
 use crate::capture::Capture;
+use crate::time::Time;
 
 /// The topics that the parameters pick.
 pub(crate) fn selection(config: &NodeConfig) -> Selection {
@@ -24,6 +26,23 @@ pub(crate) fn check_selection(setup: &Setup, config: &NodeConfig) -> Result<()> 
             exclude: config.exclude.clone(),
         };
         bail!("{}", setup.placed(&nothing.to_string()));
+    }
+    if setup.use_sim_time() {
+        check_clock(config)?;
+    }
+    Ok(())
+}
+
+/// Refuses simulated time without the topic that tells it.
+///
+/// # Errors
+/// When no pattern takes `/clock`.
+pub fn check_clock(config: &NodeConfig) -> Result<()> {
+    let clock = topics::CLOCK.name;
+    if !selection(config).takes(clock) {
+        bail!(
+            "use_sim_time: {clock}, by which messages are stamped, is not among the topics that are recorded: add it to topics, or take it from exclude"
+        );
     }
     Ok(())
 }
@@ -76,21 +95,19 @@ fn begin(config: &NodeConfig) -> Result<(PathBuf, Directory)> {
 }
 
 /// Records the network into a new bag; `machine` is the text of the machine file, `name` the listener's own name on
-/// the graph.
+/// the graph, and `time` stamps what comes.
 ///
 /// # Errors
 /// When the bag is there already or cannot be written, or there is no network.
-pub fn record(config: &NodeConfig, machine: Option<String>, name: &str) -> Result<Capture> {
-    record_by(config, machine, name, HostTime::default())
-}
-
-/// The same, with receive stamps by the clock `time`.
-pub(crate) fn record_by(
+pub fn record(
     config: &NodeConfig,
     machine: Option<String>,
     name: &str,
-    time: HostTime,
+    time: Time,
 ) -> Result<Capture> {
+    if matches!(time, Time::Simulated) {
+        check_clock(config)?;
+    }
     let (path, directory) = begin(config)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let begin = || -> Result<_> {

@@ -6,14 +6,15 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use abbe_msgs::{Description, Qos, Release, description_of, topics};
 use anyhow::Result;
-use node_runtime::HostTime;
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::tap::{RawTap, Selection, TapEvent, Tapped, TappedTopic};
 use recorder::{
-    Channel, ChannelId, MessageStamp, Recorder, RecorderError, RecorderSink, RecorderStats,
-    RecordingSummary, RingSink,
+    Channel, ChannelId, Recorder, RecorderError, RecorderSink, RecorderStats, RecordingSummary,
+    RingSink,
 };
+
+use crate::time::{Early, Stamper, Time};
 
 /// What the listener counts and cannot put into the bag.
 #[derive(Default)]
@@ -135,17 +136,32 @@ pub(crate) struct Scribe {
     /// Topics of which a message was no plain CDR; each is reported once.
     unreadable: BTreeSet<String>,
     troubles: Arc<Troubles>,
-    time: HostTime,
+    stamper: Stamper,
+    early: Early,
+}
+
+impl Drop for Scribe {
+    /// What has waited until the end is lost.
+    fn drop(&mut self) {
+        let early = self.early.samples.len();
+        if early > 0 {
+            self.lose(early as u64);
+            self.troubles.topics().push(format!(
+                "/clock: none came, so that {early} messages have no time and are not recorded: start what publishes it, or record without use_sim_time"
+            ));
+        }
+    }
 }
 
 impl Scribe {
-    pub fn new(store: Store, troubles: Arc<Troubles>, time: HostTime) -> Self {
+    pub fn new(store: Store, troubles: Arc<Troubles>, time: Time) -> Self {
         Self {
             store,
             channels: BTreeMap::new(),
             unreadable: BTreeSet::new(),
             troubles,
-            time,
+            stamper: Stamper::new(time),
+            early: Early::default(),
         }
     }
 
@@ -184,13 +200,7 @@ impl Scribe {
             }
             TapEvent::Unreadable { topic, reason } => {
                 self.lose(1);
-                if self.unreadable.insert(topic.name.clone()) {
-                    let name = &topic.name;
-                    let word = format!(
-                        "{name}: what cannot be read is not recorded and counts as lost, the first: {reason}"
-                    );
-                    self.troubles.topics().push(word);
-                }
+                self.report_once(topic, &format!("what cannot be read is not recorded and counts as lost, the first: {reason}"));
             }
         }
     }
@@ -211,22 +221,49 @@ impl Scribe {
         }
     }
 
-    fn sample(&self, sample: &Tapped) {
-        let Some(channel) = self.channels.get(&sample.topic.name) else {
+    /// Says once of a topic what is wrong with its messages.
+    fn report_once(&mut self, topic: &TappedTopic, reason: &str) {
+        if self.unreadable.insert(topic.name.clone()) {
+            let name = &topic.name;
+            self.troubles.topics().push(format!("{name}: {reason}"));
+        }
+    }
+
+    fn sample(&mut self, sample: &Tapped) {
+        let Some(channel) = self.channels.get(&sample.topic.name).copied() else {
             return;
         };
         self.lose(sample.lost);
-        let received = self.time.shown(sample.received).nanos();
-        let stamp = MessageStamp {
-            log_time_nanos: received,
-            publish_time_nanos: sample.source.map_or(received, |at| at.nanos()),
-            // The low half of the writer's count, as the file has room for it.
-            sequence: (sample.sequence & i64::from(u32::MAX)) as u32,
+        if let Err(reason) = self.stamper.hear(sample) {
+            self.report_once(
+                &sample.topic,
+                &format!("recorded, but not followed, the first: {reason}"),
+            );
+        }
+        if self.stamper.stamp(sample).is_none() {
+            if !self.early.keep(channel, sample) {
+                self.lose(1);
+                self.report_once(
+                    &sample.topic,
+                    "too many messages before the first /clock: what comes until then is lost",
+                );
+            }
+            return;
+        }
+        for (channel, sample) in std::mem::take(&mut self.early).samples {
+            self.write(channel, &sample);
+        }
+        self.write(channel, sample);
+    }
+
+    fn write(&self, channel: ChannelId, sample: &Tapped) {
+        let Some(stamp) = self.stamper.stamp(sample) else {
+            return;
         };
         // What finds the queue full is counted there.
         let _ = match &self.store {
-            Store::Bag(sink) => sink.push(*channel, stamp, &sample.bytes),
-            Store::Ring(sink) => sink.push(*channel, stamp, &sample.bytes),
+            Store::Bag(sink) => sink.push(channel, stamp, &sample.bytes),
+            Store::Ring(sink) => sink.push(channel, stamp, &sample.bytes),
         };
     }
 
@@ -238,7 +275,7 @@ impl Scribe {
 }
 
 impl Capture {
-    /// Records into `recorder` what `selection` picks, received by the clock `time`; `look` sees every event first.
+    /// Records into `recorder` what `selection` picks, stamped by `time`; `look` sees every event first.
     ///
     /// # Errors
     /// When there is no network.
@@ -247,7 +284,7 @@ impl Capture {
         names: &NodeNames,
         selection: Selection,
         recorder: Recorder,
-        time: HostTime,
+        time: Time,
         mut look: impl FnMut(&TapEvent) + Send + 'static,
     ) -> Result<Self> {
         let troubles = Arc::<Troubles>::default();
@@ -302,6 +339,12 @@ impl Capture {
 
 #[cfg(test)]
 mod tests {
+    use abbe_msgs::builtin_interfaces::msg::Time as RosTime;
+    use abbe_msgs::rosgraph_msgs::msg::Clock;
+    use abbe_msgs::to_cdr;
+    use metrology::stamp::Stamp;
+    use recorder::{Bag, Directory, Event, Order, RecorderConfig, Recording};
+
     use super::*;
 
     fn found(name: &str, type_name: &str) -> TappedTopic {
@@ -362,5 +405,97 @@ mod tests {
             (channel.type_hash, channel.definition),
             (hash, String::new())
         );
+    }
+
+    fn sample(name: &str, type_name: &str, number: i64, bytes: Vec<u8>) -> TapEvent {
+        TapEvent::Sample(Tapped {
+            topic: Arc::new(found(name, type_name)),
+            source: Some(Stamp::from_nanos(1_800_000_000_000_000_000)),
+            received: Stamp::from_nanos(1_800_000_000_000_000_000 + number),
+            sequence: number,
+            lost: 0,
+            bytes: bytes.into(),
+        })
+    }
+
+    fn clock(sec: i32, nanosec: u32, number: i64) -> TapEvent {
+        let clock = RosTime { sec, nanosec };
+        sample(
+            "/clock",
+            "rosgraph_msgs/msg/Clock",
+            number,
+            to_cdr(&Clock { clock }),
+        )
+    }
+
+    /// Records events by simulated time; log time (s) and topic of each message of the bag, what was lost, and the remarks.
+    fn recorded(events: &[TapEvent]) -> (Vec<(u64, String)>, u64, Vec<String>) {
+        let home = tempfile::tempdir().unwrap();
+        let path = home.path().join("bag");
+        let config = RecorderConfig::default();
+        let directory = Directory::create(&path).unwrap();
+        let recording = Recording::begin(directory, "bag", config.clone()).unwrap();
+        let recorder = Recorder::start(recording, &config).unwrap();
+        let troubles = Arc::<Troubles>::default();
+        let store = Store::Bag(recorder.sink());
+        let mut scribe = Scribe::new(store, Arc::clone(&troubles), Time::Simulated);
+        for (name, type_name) in [
+            ("/clock", "rosgraph_msgs/msg/Clock"),
+            ("/word", "std_msgs/msg/String"),
+        ] {
+            scribe.take(&TapEvent::Found(Arc::new(found(name, type_name))));
+        }
+        events.iter().for_each(|event| scribe.take(event));
+        drop(scribe);
+        recorder.finish().unwrap();
+        let bag = Bag::open(&path).unwrap();
+        let mut messages = bag.messages(Order::File);
+        let mut found = Vec::new();
+        while let Some(Event::Message(message)) = messages.next_event() {
+            assert_eq!(message.log_time_nanos, message.publish_time_nanos);
+            let topic = bag.topic(message.topic).topic.clone();
+            found.push((message.log_time_nanos / 1_000_000_000, topic));
+        }
+        (found, troubles.lost_on_network(), troubles.unrecorded())
+    }
+
+    fn word(number: i64) -> TapEvent {
+        let bytes = vec![0, 1, 0, 0, 1, 0, 0, 0, 0];
+        sample("/word", "std_msgs/msg/String", number, bytes)
+    }
+
+    #[test]
+    fn simulated_time_stamps_what_comes_and_what_came_before_it_began() {
+        let events = [
+            word(1),
+            clock(100, 0, 2),
+            word(3),
+            clock(101, 0, 4),
+            word(5),
+        ];
+        let (messages, lost, remarks) = recorded(&events);
+        let topics = ["/word", "/clock", "/word", "/clock", "/word"];
+        let wanted = [100, 100, 100, 101, 101].into_iter().zip(topics);
+        let wanted: Vec<_> = wanted.map(|(s, topic)| (s, topic.to_owned())).collect();
+        assert_eq!((messages, lost, remarks), (wanted, 0, vec![]));
+    }
+
+    #[test]
+    fn without_a_clock_nothing_has_a_time_and_that_is_told() {
+        let (messages, lost, remarks) = recorded(&[word(1), word(2)]);
+        assert_eq!((messages.len(), lost), (0, 2));
+        assert!(
+            remarks[0].contains("2 messages have no time"),
+            "{remarks:?}"
+        );
+    }
+
+    #[test]
+    fn a_clock_that_shows_no_instant_is_recorded_and_not_followed() {
+        let events = [clock(100, 0, 1), clock(200, 1_000_000_000, 2), word(3)];
+        let (messages, lost, remarks) = recorded(&events);
+        let times: Vec<u64> = messages.iter().map(|(s, _)| *s).collect();
+        assert_eq!((times, lost), (vec![100, 100, 100], 0));
+        assert!(remarks[0].contains("clock.nanosec"), "{remarks:?}");
     }
 }

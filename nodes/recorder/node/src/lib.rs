@@ -13,12 +13,14 @@ use recorder::NodeConfig;
 mod begin;
 mod capture;
 mod ring;
+mod time;
 mod watch;
 
-pub use begin::record;
+pub use begin::{check_clock, record};
 use begin::{context, selection};
 pub use capture::{Capture, Captured, unmatched};
 use ring::RingCapture;
+pub use time::Time;
 use watch::{Input, Output, Watch, Work};
 
 /// Time between two looks at the counts.
@@ -48,13 +50,13 @@ pub fn listen(
 ) -> Result<Box<dyn Node>> {
     let parameters = setup.resolved(config)?;
     let tap = format!("{}_tap", setup.name());
+    let time = Time::of(setup.use_sim_time(), setup.host_time());
     let work = match config.ring {
-        None => Work::Bag(begin::record_by(config, machine, &tap, setup.host_time())?),
+        None => Work::Bag(record(config, machine, &tap, time)?),
         Some(own) => {
             let kept = (Path::new(&config.bag), context(machine));
             let (names, writing) = (NodeNames::new(&tap, &[])?, config.writing.clone());
             let picked = selection(config);
-            let time = setup.host_time();
             let ring = RingCapture::start(&names, picked, &own, writing, kept, time)?;
             Work::Ring(Box::new(ring))
         }

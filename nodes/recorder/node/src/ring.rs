@@ -9,7 +9,6 @@ use std::thread::JoinHandle;
 use abbe_msgs::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus};
 use abbe_msgs::{Message as _, from_cdr};
 use anyhow::Result;
-use node_runtime::HostTime;
 use node_runtime::environment::Environment;
 use node_runtime::names::NodeNames;
 use node_runtime::tap::{RawTap, Selection, TapEvent, Tapped};
@@ -20,6 +19,7 @@ use recorder::{
 
 use crate::begin::{free_folder, name_of};
 use crate::capture::{Scribe, Store, Troubles};
+use crate::time::Time;
 
 /// Notices errors that begin on `/diagnostics`.
 #[derive(Default)]
@@ -78,7 +78,7 @@ impl RingCapture {
         config: &RingConfig,
         writing: RecorderConfig,
         (folder, context): (&Path, RunContext),
-        time: HostTime,
+        time: Time,
     ) -> Result<Self> {
         writing.checked()?;
         let name = name_of(folder)?;
