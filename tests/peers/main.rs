@@ -15,6 +15,8 @@ mod frames;
 mod hashes;
 mod latched;
 mod opcua_cell;
+mod opcua_machine;
+mod opcua_shift;
 mod ring;
 mod served;
 mod slow;

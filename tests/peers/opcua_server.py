@@ -237,7 +237,7 @@ async def burst(variables: dict, command: dict) -> float:
 async def rows(server: Server, variables: dict, command: dict) -> None:
     for name, value, nanos in command["rows"]:
         at = EPOCH + datetime.timedelta(microseconds=nanos / 1000)
-        variant = ua.Variant(value, None if isinstance(value, str) else ua.VariantType.Double)
+        variant = ua.Variant(value, ua.VariantType.Double if isinstance(value, (int, float)) and not isinstance(value, bool) else None)
         data = ua.DataValue(Value=variant, SourceTimestamp=at, ServerTimestamp=at)
         await server.write_attribute_value(variables[name].nodeid, data)
 
