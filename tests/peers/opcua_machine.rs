@@ -99,10 +99,12 @@ pub fn is_built() -> bool {
 pub fn diagnosed(bag: &Path, machine: &str) -> Value {
     let mut diagnose = command(0, &["diagnose", "--json", "-"]);
     diagnose.arg(bag).arg("--machine").arg(root().join(machine));
-    diagnose.stderr(Stdio::null());
     let ended = Process::start(diagnose).ended_within(END);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.said);
-    serde_json::from_str(&ended.said).unwrap()
+    let mut values = serde_json::Deserializer::from_str(&ended.said).into_iter();
+    let report = values.next();
+    let remarks = &ended.said[values.byte_offset()..];
+    assert_eq!(ended.status.code(), Some(0), "{remarks}");
+    report.unwrap().unwrap()
 }
 
 /// The causes that a diagnosis names.

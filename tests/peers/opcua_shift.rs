@@ -3,7 +3,7 @@
 //! coolant; `opcua_bridge` hears them in simulated time, the recorder keeps them beside the probe's touches, and
 //! `abbe diagnose` names the cause.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -240,12 +240,25 @@ struct Beats {
 
 impl Beats {
     fn next(&mut self) {
+        self.until(i64::MAX);
+    }
+
+    /// The next beat, at most to an instant.
+    fn until(&mut self, latest: i64) {
         let left = self.due.saturating_duration_since(Instant::now());
         std::thread::sleep(left);
         self.due = Instant::now().max(self.due) + BEAT;
-        self.now += self.step_nanos;
+        self.now = latest.min(self.now + self.step_nanos);
         let clock = abbe_msgs::time(Stamp::<metrology::stamp::Host>::from_nanos(self.now));
         self.voice.say(0, &Clock { clock });
+    }
+
+    /// Says something, and lets no time pass until everybody has it, and the states before it.
+    fn say(&mut self, place: usize, bytes: &[u8]) {
+        std::thread::sleep(3 * BEAT);
+        self.voice.bytes(place, bytes);
+        self.voice.settle();
+        std::thread::sleep(BEAT);
     }
 }
 
@@ -262,16 +275,20 @@ fn step_nanos(segment: &[u8]) -> i64 {
 
 /// Plays a shift: nodes of the server and the probe's messages, each as its time comes.
 fn play(shift: Shift, server: &mut Server, beats: &mut Beats) {
+    let is_said = |moment: &Moment| matches!(moment, Moment::Said(..));
+    let said = shift.moments.iter().filter(|(_, moment)| is_said(moment));
+    let mut said: VecDeque<i64> = said.map(|(at, _)| *at).collect();
     let mut moments = shift.moments.into_iter().peekable();
     while moments.peek().is_some() {
-        beats.next();
+        beats.until(said.front().copied().unwrap_or(i64::MAX));
         let mut rows = Vec::new();
         while let Some((_, moment)) = moments.next_if(|(at, _)| *at <= beats.now) {
             match moment {
                 Moment::Rows(more) => rows.extend(more),
                 Moment::Said(place, bytes) => {
+                    said.pop_front();
                     server.write(&std::mem::take(&mut rows));
-                    beats.voice.bytes(place, &bytes);
+                    beats.say(place, &bytes);
                     if place == 2 {
                         beats.step_nanos = step_nanos(&bytes);
                     }

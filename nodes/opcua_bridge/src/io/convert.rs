@@ -123,6 +123,21 @@ pub(super) fn words(status: StatusCode) -> String {
     }
 }
 
+/// The words of an error of the client, without what only its programmers read: of an error of the system its message.
+pub(super) fn reason(error: &impl ToString) -> String {
+    let text = error.to_string();
+    let Some((before, system)) = text.split_once("Os { code: ") else {
+        return text;
+    };
+    let message = system
+        .split_once("message: \"")
+        .and_then(|(_, rest)| rest.split_once("\" }"));
+    message.map_or_else(
+        || text.clone(),
+        |(message, after)| format!("{before}{message}{after}"),
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,6 +171,16 @@ mod tests {
         let change = change(0, value, true);
         assert_eq!(change.machine_at, Some(Stamp::from_nanos(1_000_000_000)));
         assert_eq!((change.payload, change.is_held), (Payload::Null, true));
+    }
+
+    #[test]
+    fn an_error_of_the_system_is_told_by_its_message() {
+        let debug = r#"BadCommunicationError: Could not connect to host a:1, Os { code: 111, kind: ConnectionRefused, message: "Connection refused" }"#;
+        let plain = "BadCommunicationError: Could not connect to host a:1, Connection refused";
+        assert_eq!(reason(&debug), plain);
+        for other in ["BadTimeout: The operation timed out.", "Os { code: 5"] {
+            assert_eq!(reason(&other), other);
+        }
     }
 
     #[test]

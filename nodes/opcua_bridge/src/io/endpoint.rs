@@ -5,7 +5,7 @@ use opcua::crypto::SecurityPolicy;
 use opcua::types::{EndpointDescription, MessageSecurityMode, StatusCode, UserTokenType};
 
 use super::Credentials;
-use super::convert::words;
+use super::convert::{self, words};
 use crate::config::{Mode, Policy, SecurityConfig, Settings};
 use crate::stage::IoEvent;
 
@@ -61,7 +61,7 @@ pub(super) async fn choose(
     let endpoints = match tokio::time::timeout(limit, asked).await {
         Ok(Ok(endpoints)) => endpoints,
         Ok(Err(error)) => {
-            let reason = error.to_string();
+            let reason = convert::reason(&error);
             return Err(IoEvent::Ended { reason });
         }
         Err(_) => {

@@ -11,7 +11,7 @@ use opcua::types::{
 use tokio::time::{Instant, timeout_at};
 
 use super::client::Clients;
-use super::convert::identifier;
+use super::convert::{self, identifier};
 use super::nodes::{children, namespaces};
 use super::{Credentials, endpoint};
 use crate::config::{BridgeConfig, ConnectionConfig, SecurityConfig, Settings, SubscriptionConfig};
@@ -69,7 +69,12 @@ async fn asked(settings: &Settings) -> Result<Survey, BridgeError> {
     };
     let deadline = Instant::now() + LIMIT;
     let clients = Clients::new(settings, &Credentials::default())?;
-    let late = || failed("no answer within 10 s".to_owned());
+    let late = || {
+        failed(
+            "no answer within 10 s: is it an OPC UA server, and the port its own (4840 for most)?"
+                .to_owned(),
+        )
+    };
     let chosen = timeout_at(deadline, endpoint::choose(&clients.discovery, settings)).await;
     let endpoint = match chosen.map_err(|_| late())? {
         Ok(endpoint) => endpoint,
@@ -84,7 +89,7 @@ async fn asked(settings: &Settings) -> Result<Survey, BridgeError> {
         .and_then(|builder| {
             builder.build(std::sync::Arc::clone(clients.discovery.certificate_store()))
         });
-    let (session, event_loop) = built.map_err(|error| failed(error.to_string()))?;
+    let (session, event_loop) = built.map_err(|error| failed(convert::reason(&error)))?;
     let pump = event_loop.spawn();
     let made = timeout_at(deadline, session.wait_for_connection()).await;
     if !made.map_err(|_| late())? {

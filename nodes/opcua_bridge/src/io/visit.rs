@@ -26,7 +26,7 @@ use tokio::task::JoinHandle;
 use tokio::time::Instant;
 
 use super::client::{Clients, Events, duration, host_now};
-use super::convert::{change, words};
+use super::convert::{self, change, words};
 use super::sequence::{Place, Sequence};
 use super::{Credentials, endpoint, nodes};
 use crate::config::Settings;
@@ -190,7 +190,7 @@ fn is_too_long(status: StatusCode) -> bool {
 }
 
 fn ended(error: impl std::fmt::Display) -> IoEvent {
-    let reason = error.to_string();
+    let reason = convert::reason(&error);
     IoEvent::Ended { reason }
 }
 

@@ -26,7 +26,11 @@ impl Environment {
     /// What to warn of where `ROS_DISTRO` is no name that is known.
     #[must_use]
     pub fn distribution_warning(&self) -> Option<String> {
+        /// Letters of a name that are shown.
+        const SHOWN: usize = 64;
         let name = self.unknown_distribution.as_ref()?;
+        let cut = name.char_indices().nth(SHOWN).map(|(at, _)| at);
+        let name = cut.map_or_else(|| name.clone(), |at| format!("{}…", &name[..at]));
         Some(format!(
             "ROS_DISTRO={name}: unknown, taken as newer than lyrical: lifecycle_msgs/TransitionEvent has Lyrical's definition; \
              set ROS_DISTRO=jazzy for that of Jazzy"
@@ -65,6 +69,8 @@ mod tests {
         assert_eq!(environment.release, Release::Lyrical);
         let warning = environment.distribution_warning().unwrap();
         assert!(warning.contains("ROS_DISTRO=mystic: unknown"), "{warning}");
+        let long = read(&"ß".repeat(10_000)).distribution_warning().unwrap();
+        assert!(long.contains("ß…: unknown") && long.len() < 500, "{long}");
         assert!(warning.contains("TransitionEvent"), "{warning}");
     }
 }
