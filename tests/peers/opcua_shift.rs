@@ -12,9 +12,11 @@ use abbe_msgs::rosgraph_msgs::msg::Clock;
 use abbe_msgs::sensor_msgs::msg::Temperature;
 use abbe_msgs::{from_cdr, msg, topics};
 use abbe_tests::graph::{Graph, Voice, port};
+use abbe_tests::hosts::bag::{messages, numbers};
 use abbe_tests::program::{Process, command, domain};
 use abbe_tests::python::interpreter;
 use abbe_tests::scenario::Scenario;
+use metrology::Axis;
 use metrology::stamp::Stamp;
 use recorder::{Bag, Event, Order};
 use serde_json::{Value, json};
@@ -39,6 +41,10 @@ const MACHINE_FILE: &str = "launch_configs/real_shift/machine.yaml";
 const BEAT: Duration = Duration::from_millis(20);
 const STEP_NANOS: i64 = 1_000_000_000;
 const STEP_IN_TESTS_NANOS: i64 = 200_000_000;
+/// Before a test begins or ends so much time goes by in small steps: what the server had is heard by then, as from a control in
+/// real time.
+const APPROACH_NANOS: i64 = 400_000_000;
+const STEP_TO_TEST_NANOS: i64 = 40_000_000;
 /// A state that the server is given is at least so much later than the one before, ns.
 const STATE_NANOS: i64 = 20_000_000;
 /// The fault of the coolant begins and ends so long after the begin, ns.
@@ -115,6 +121,10 @@ fn before() -> BTreeMap<String, Value> {
     values.insert("coolant".to_owned(), json!(false));
     values
 }
+
+/// Places of the voice's topics.
+const TOUCH: usize = 1;
+const SEGMENT: usize = 2;
 
 /// What happens at an instant of the shift.
 enum Moment {
@@ -212,9 +222,9 @@ fn shift(path: &Path) -> Shift {
         if name == topics::AXES_STATE.name {
             parts.state(&from_cdr(message.data).unwrap());
         } else if name == topics::PROBE_TRIGGER.name {
-            parts.shift.moments.push(said(1));
+            parts.shift.moments.push(said(TOUCH));
         } else if name == topics::TEST_SEGMENT.name {
-            parts.shift.moments.push(said(2));
+            parts.shift.moments.push(said(SEGMENT));
         } else if let Some(sensor) = name.strip_prefix("temperature/") {
             if SENSORS.contains(&sensor) {
                 let sample: Temperature = from_cdr(message.data).unwrap();
@@ -240,22 +250,27 @@ struct Beats {
 
 impl Beats {
     fn next(&mut self) {
-        self.until(i64::MAX);
+        self.until(i64::MAX, false);
     }
 
-    /// The next beat, at most to an instant.
-    fn until(&mut self, latest: i64) {
+    /// The next beat, at most to the instant of something that is said, such as the begin of a test.
+    fn until(&mut self, latest: i64, is_segment: bool) {
+        let left_nanos = latest.saturating_sub(self.now);
+        let step_nanos = match is_segment {
+            true if left_nanos <= APPROACH_NANOS => STEP_TO_TEST_NANOS,
+            true => self.step_nanos.min(left_nanos - APPROACH_NANOS),
+            false => self.step_nanos,
+        };
         let left = self.due.saturating_duration_since(Instant::now());
         std::thread::sleep(left);
         self.due = Instant::now().max(self.due) + BEAT;
-        self.now = latest.min(self.now + self.step_nanos);
+        self.now = latest.min(self.now + step_nanos);
         let clock = abbe_msgs::time(Stamp::<metrology::stamp::Host>::from_nanos(self.now));
         self.voice.say(0, &Clock { clock });
     }
 
-    /// Says something, and lets no time pass until everybody has it, and the states before it.
+    /// Says something, and lets no time pass until everybody has it.
     fn say(&mut self, place: usize, bytes: &[u8]) {
-        std::thread::sleep(3 * BEAT);
         self.voice.bytes(place, bytes);
         self.voice.settle();
         std::thread::sleep(BEAT);
@@ -275,12 +290,18 @@ fn step_nanos(segment: &[u8]) -> i64 {
 
 /// Plays a shift: nodes of the server and the probe's messages, each as its time comes.
 fn play(shift: Shift, server: &mut Server, beats: &mut Beats) {
-    let is_said = |moment: &Moment| matches!(moment, Moment::Said(..));
-    let said = shift.moments.iter().filter(|(_, moment)| is_said(moment));
-    let mut said: VecDeque<i64> = said.map(|(at, _)| *at).collect();
+    let said = shift
+        .moments
+        .iter()
+        .filter_map(|(at, moment)| match moment {
+            Moment::Said(place, _) => Some((*at, *place == SEGMENT)),
+            Moment::Rows(_) => None,
+        });
+    let mut said: VecDeque<(i64, bool)> = said.collect();
     let mut moments = shift.moments.into_iter().peekable();
     while moments.peek().is_some() {
-        beats.until(said.front().copied().unwrap_or(i64::MAX));
+        let (latest, is_segment) = said.front().copied().unwrap_or((i64::MAX, false));
+        beats.until(latest, is_segment);
         let mut rows = Vec::new();
         while let Some((_, moment)) = moments.next_if(|(at, _)| *at <= beats.now) {
             match moment {
@@ -289,7 +310,7 @@ fn play(shift: Shift, server: &mut Server, beats: &mut Beats) {
                     said.pop_front();
                     server.write(&std::mem::take(&mut rows));
                     beats.say(place, &bytes);
-                    if place == 2 {
+                    if place == SEGMENT {
                         beats.step_nanos = step_nanos(&bytes);
                     }
                 }
@@ -387,9 +408,38 @@ fn is_whole(bag: &Path, given: &BTreeMap<String, Vec<Value>>) {
     }
 }
 
+/// That the bag has each position, touch and begin or end of a test that was given.
+fn has_the_motion(bag: &Path, simulated: &Path, given: &BTreeMap<String, Vec<Value>>) {
+    for topic in [topics::PROBE_TRIGGER.name, topics::TEST_SEGMENT.name] {
+        let [all, heard] = [simulated, bag].map(|bag| numbers(bag, topic).len());
+        assert_eq!(all, heard, "{topic}");
+    }
+    let states = messages(bag, &topics::AXES_STATE);
+    for axis in [Axis::X, Axis::Y, Axis::Z] {
+        let mut heard: Vec<f64> = states.iter().map(|(_, state)| state.motor[axis]).collect();
+        heard.dedup();
+        let given = &given[&format!("{}act", axis.letter())];
+        let given: Vec<f64> = given.iter().map(|value| value.as_f64().unwrap()).collect();
+        // What held before the shift may be in the bag too.
+        let begin = heard.len().saturating_sub(given.len());
+        let far = heard[begin..]
+            .iter()
+            .zip(&given)
+            .filter(|(a, b)| (**a - **b).abs() > 1e-9);
+        assert!(
+            begin <= 1 && heard.len() >= given.len(),
+            "{axis:?}: {} of {}",
+            heard.len(),
+            given.len()
+        );
+        assert_eq!(far.count(), 0, "{axis:?}");
+        eprintln!("{axis:?}: {} positions", given.len());
+    }
+}
+
 /// Plays the shift of `simulated` to a cell of bridge and recorder; each value that the server was given.
 fn recorded(simulated: &Path, python: &PathBuf, into: &Path) -> BTreeMap<String, Vec<Value>> {
-    let (home, domain) = (tempfile::tempdir().unwrap(), domain(15));
+    let (home, domain) = (tempfile::tempdir().unwrap(), domain(5));
     let shift = shift(simulated);
     let given = shift.values.clone();
     let begin = shift.moments[0].0;
@@ -404,6 +454,10 @@ fn recorded(simulated: &Path, python: &PathBuf, into: &Path) -> BTreeMap<String,
     let file = server.parameters(home.path(), &map(), 10_000);
     let graph = Graph::join(domain);
     let began = Instant::now();
+    let mut record = command(domain, &["record", "--use-sim-time", "-o"]);
+    // Fifty times as fast, that is more than a best-effort topic holds.
+    record.arg(into).args(["--exclude", "/joint_states"]);
+    let recorder = Process::start(record);
     let file = file.to_string_lossy();
     let arguments = ["--params-file", &file, "-p", "use_sim_time:=true"];
     let bridge = Process::node(domain, "opcua_bridge", &arguments);
@@ -419,25 +473,20 @@ fn recorded(simulated: &Path, python: &PathBuf, into: &Path) -> BTreeMap<String,
         due: Instant::now(),
     };
     // Timers of the nodes follow the clock, so they say something about themselves as it goes on.
-    for _ in 0..LEAD_BEATS / 2 {
+    for _ in 0..LEAD_BEATS - 1 {
         beats.next();
     }
     graph.alive("opcua_bridge", began);
-    // Only now, so that what held before the shift is not in the bag.
-    let mut record = command(domain, &["record", "--use-sim-time", "-o"]);
-    // Fifty times as fast, that is more than a best-effort topic holds.
-    record.arg(into).args(["--exclude", "/joint_states"]);
-    let recorder = Process::start(record);
-    for _ in 0..LEAD_BEATS / 2 - 1 {
-        beats.next();
-    }
     play(shift, &mut server, &mut beats);
-    for _ in 0..50 {
+    for _ in 0..LEAD_BEATS / 2 {
         beats.next();
     }
     beats.voice.settle();
     bridge.stop();
-    recorder.stop();
+    recorder.signal(nix::sys::signal::Signal::SIGINT);
+    // What counts as lost may be a best-effort /clock: whether the rest is whole is seen in the bag.
+    let code = recorder.ended_within(Duration::from_secs(60)).status.code();
+    assert!(matches!(code, Some(0 | 3)), "{code:?}");
     given
 }
 
@@ -455,6 +504,7 @@ fn a_simulated_shift_behind_opc_ua_is_recorded_whole_and_its_cause_named() {
     let bag = scenario.path("behind_opc_ua");
     let given = recorded(&simulated, &python, &bag);
     is_whole(&bag, &given);
+    has_the_motion(&bag, &simulated, &given);
     assert_eq!(levels_of_the_coolant(&bag), [2, 0]);
     // The way through the server changes nothing of what is found.
     let [direct, behind] =

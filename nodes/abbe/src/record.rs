@@ -12,7 +12,7 @@ use node_runtime::complain;
 use node_runtime::environment::Environment;
 use node_runtime::tap::Selection;
 use node_runtime::text_file;
-use node_runtime::{HostTime, Interruption, Setup};
+use node_runtime::{Interruption, Setup};
 use recorder::{ChunkCompression, NodeConfig, RecorderConfig, RecorderError, RingConfig};
 use recorder_node::{Capture, Time};
 use reports::loss;
@@ -73,6 +73,8 @@ const RECORDER_NAME: &str = "abbe_record";
 const KEEPER: &str = "recorder";
 /// Between two looks at whether it is over or the disk is full; a signal wakes it at once.
 const DISK_PERIOD: Duration = Duration::from_millis(500);
+/// That no `/clock` has come is told after so many looks.
+const LOOKS_FOR_CLOCK: u32 = 10;
 
 impl Record {
     /// Records until SIGINT or SIGTERM; exit code 3 when the bag lost something.
@@ -90,9 +92,9 @@ impl Record {
         });
         let machine = machine.transpose()?;
         if config.ring.is_some() {
-            return self.keep(&config, machine, &interruption);
+            return keep(&config, machine, &interruption);
         }
-        let time = Time::of(self.use_sim_time, HostTime::default());
+        let time = Time::simulated(self.use_sim_time);
         let capture = recorder_node::record(&config, machine, RECORDER_NAME, time)?;
         let bag = &config.bag;
         complain!("Recording into {bag}; Ctrl-C ends it.");
@@ -164,34 +166,9 @@ impl Record {
             topics,
             writing,
         };
-        if self.use_sim_time {
-            recorder_node::check_clock(&config).map_err(|error| refused("record", error))?;
-        }
+        let clock = recorder_node::check_clock(&config, &Time::simulated(self.use_sim_time));
+        clock.map_err(|error| refused("record", error))?;
         Ok(config)
-    }
-
-    /// Keeps the last minutes as the node `recorder`, whose services save them.
-    fn keep(
-        &self,
-        config: &NodeConfig,
-        machine: Option<String>,
-        interruption: &Interruption,
-    ) -> Result<ExitCode> {
-        let words = match self.use_sim_time {
-            true => &["--ros-args", "-p", "use_sim_time:=true"][..],
-            false => &[],
-        };
-        let words: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();
-        let setup = Setup::new(KEEPER, &Arguments::parse(words)?)?;
-        let node = recorder_node::listen(&setup, config, machine)?;
-        let running = node_runtime::launch(&Environment::read()?, vec![(setup, node)])?;
-        let words = "ros2 service call /recorder/save std_srvs/srv/Trigger";
-        complain!(
-            "Keeping what is said; `{words}` saves it below {}; Ctrl-C ends it.",
-            config.bag
-        );
-        running.until(interruption)?;
-        Ok(ExitCode::SUCCESS)
     }
 }
 
@@ -200,7 +177,13 @@ impl Record {
 fn watch(capture: &Capture, interruption: &Interruption) -> Result<Option<Alarm>> {
     let mut trouble = None;
     let mut undecoded = node_runtime::Undecoded::default();
+    let mut looks_early = 0;
     while !interruption.wait(DISK_PERIOD) {
+        let early = capture.early();
+        looks_early = if early > 0 { looks_early + 1 } else { 0 };
+        if looks_early == LOOKS_FOR_CLOCK {
+            complain!("abbe: no /clock has come yet: {early} messages wait for it");
+        }
         if let Some(news) = undecoded.news() {
             complain!("abbe: {news}");
         }
@@ -222,6 +205,24 @@ fn watch(capture: &Capture, interruption: &Interruption) -> Result<Option<Alarm>
         }
     }
     Ok(None)
+}
+
+/// Keeps the last minutes as the node `recorder`, whose services save them.
+fn keep(
+    config: &NodeConfig,
+    machine: Option<String>,
+    interruption: &Interruption,
+) -> Result<ExitCode> {
+    let setup = Setup::new(KEEPER, &Arguments::parse(Vec::new())?)?;
+    let node = recorder_node::listen(&setup, config, machine)?;
+    let running = node_runtime::launch(&Environment::read()?, vec![(setup, node)])?;
+    let words = "ros2 service call /recorder/save std_srvs/srv/Trigger";
+    complain!(
+        "Keeping what is said; `{words}` saves it below {}; Ctrl-C ends it.",
+        config.bag
+    );
+    running.until(interruption)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 #[cfg(test)]
@@ -265,9 +266,13 @@ mod tests {
         for good in [&[][..], &["/axes/state", "/clock"], &["/c*"]] {
             assert!(of(good).is_ok(), "{good:?}");
         }
-        for bad in [&["/axes/state"][..], &["--exclude", "/clock"]] {
+        for (bad, word) in [
+            (&["/axes/state"][..], "add it to topics"),
+            (&["--exclude", "/clock"], "add it to topics"),
+            (&["--ring", "60"], "real time"),
+        ] {
             let said = of(bad).unwrap_err().to_string();
-            assert!(said.contains("add it to topics"), "{bad:?}: {said}");
+            assert!(said.contains(word), "{bad:?}: {said}");
         }
     }
 

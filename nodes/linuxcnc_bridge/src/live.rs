@@ -1,7 +1,7 @@
 //! The stage together with its sockets and processes: what the ROS shell drives.
 //!
 //! To its driver it is an ordinary stage that wants a tick every few milliseconds; each tick hands
-//! over all that has come from outside since the last, with the instants at which it came, by the node's clock.
+//! over all that has come from outside since the last, with the instants at which it came.
 
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use machine::MachineFile;
 use metrology::sample::AxisCompensation;
 use metrology::stamp::{Host, Stamp};
-use metrology::{ArrivalClock, Author, Stage};
+use metrology::{Author, Stage};
 
 use crate::config::{BridgeConfig, Settings};
 use crate::error::BridgeError;
@@ -92,7 +92,6 @@ pub struct LiveBridge {
     said: Vec<Output>,
     /// How many publish offsets, since the last tick.
     publishers: Option<usize>,
-    clock: ArrivalClock,
 }
 
 impl LiveBridge {
@@ -116,7 +115,6 @@ impl LiveBridge {
             work: None,
             said: Vec::new(),
             publishers: None,
-            clock: ArrivalClock::default(),
         };
         if config.autostart {
             bridge.open()?;
@@ -136,14 +134,7 @@ impl LiveBridge {
             }),
             said: Vec::new(),
             publishers: None,
-            clock: ArrivalClock::default(),
         }
-    }
-
-    /// The same with what comes stamped by `clock`.
-    #[must_use]
-    pub fn stamped_by(self, clock: ArrivalClock) -> Self {
-        Self { clock, ..self }
     }
 
     /// Starts LinuxCNC where the configuration says so, and looks for it; nothing where that was done.
@@ -214,7 +205,6 @@ impl Stage for LiveBridge {
             LiveInput::Tick => {
                 let event = |work: &mut Work| work.io.event();
                 while let Some((came_at, event)) = self.work.as_mut().and_then(event) {
-                    let came_at = self.clock.shown(at, came_at);
                     self.pass(came_at, Input::Io(event), out)?;
                 }
                 if let Some(publishers) = self.publishers.take() {

@@ -110,12 +110,12 @@ impl LiveBridge {
                 return Ok(false);
             }
             let Some((came_at, event)) = self.io.as_ref().and_then(BridgeIo::event) else {
-                break;
+                return Ok(true);
             };
             bytes += length(&event);
             self.pass(self.clock.shown(at, came_at), Input::Io(event))?;
         }
-        Ok(true)
+        Ok(false)
     }
 }
 

@@ -241,7 +241,12 @@ impl BridgeStage {
             self.follow(at, heard, out);
         }
         match self.phase {
-            Phase::Waiting { until } if until.is_none_or(|until| at >= until) => {
+            // A clock that was set back lengthens neither a pause nor a silence.
+            Phase::Waiting { until }
+                if until.is_none_or(|until| {
+                    at >= until || at < until - self.settings.reconnect_longest
+                }) =>
+            {
                 self.phase = Phase::Asking { since: at };
                 self.heard_at = at;
                 out.extend(match &mut self.link {
@@ -250,6 +255,7 @@ impl BridgeStage {
                     Link::Log(_) => None,
                 });
             }
+            Phase::Asking { since } if since > at => self.phase = Phase::Asking { since: at },
             Phase::Asking { since } if at - since > self.settings.reply_timeout => {
                 let limit_s = self.settings.reply_timeout.as_secs_f64();
                 self.lose(at, Lost::Silent { limit_s }, out);
@@ -271,9 +277,11 @@ impl BridgeStage {
     }
 
     fn watch_silence(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
+        self.heard_at = self.heard_at.min(at);
         let silence = at - self.heard_at;
         let limit = match &mut self.link {
             Link::Shdr(link) => {
+                link.pinged_at = link.pinged_at.map(|pinged_at| pinged_at.min(at));
                 let due = link.pinged_at.zip(link.heartbeat);
                 if due.is_some_and(|(pinged_at, heartbeat)| at - pinged_at >= heartbeat) {
                     link.pinged_at = Some(at);

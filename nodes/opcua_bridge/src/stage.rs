@@ -169,10 +169,11 @@ impl BridgeStage {
 
     fn tick(&mut self, at: Stamp<Host>, out: &mut Vec<Output>) {
         self.greet(out);
+        // A clock that was set back does not lengthen a pause.
         self.taking.values.wait(at, out);
         self.taking.tell_account(at, out);
         if let Phase::Waiting { until } = self.phase
-            && until.is_none_or(|until| at >= until)
+            && until.is_none_or(|until| at >= until || at < until - self.settings.reconnect_longest)
         {
             self.phase = Phase::Asking;
             out.push(Output::Io(IoCommand::Connect));

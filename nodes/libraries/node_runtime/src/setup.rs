@@ -205,6 +205,13 @@ impl Setup {
         &self.names.namespace
     }
 
+    /// The absolute name of a topic after remapping.
+    #[must_use]
+    pub fn topic(&self, name: &str) -> String {
+        let resolved = self.names.resolve(name);
+        resolved.unwrap_or_else(|_| name.to_owned())
+    }
+
     /// Whether time comes from `/clock`.
     #[must_use]
     pub const fn use_sim_time(&self) -> bool {
@@ -222,7 +229,7 @@ impl Setup {
         self.every.host_time.clone()
     }
 
-    /// The clock by which this node stamps what it hears outside the graph. Where time is simulated that came when it is taken.
+    /// The clock by which this node stamps what it hears outside the graph. Where time is simulated, it counts as come when it is taken.
     #[must_use]
     pub fn arrival_clock(&self) -> ArrivalClock {
         let (time, is_simulated) = (self.host_time(), self.use_sim_time());

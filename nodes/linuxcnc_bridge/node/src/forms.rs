@@ -13,7 +13,7 @@ use linuxcnc_bridge::run::{Ending, Outcome};
 use metrology::sample::{AxisState, ProbeTrigger};
 use node_runtime::{Diagnostic, GoalSignal, GoalStatus, Level, Setup};
 
-/// Refuses a control that goes by `/clock`: where that rests or runs fast, no offset and no silence would be what it is taken for.
+/// Refuses a control that goes by `/clock`: where that rests or runs fast, no silence would be true.
 pub(crate) fn refuse_simulated_time(setup: &Setup) -> Result<()> {
     if setup.use_sim_time() {
         let reason = "use_sim_time = true: must be false, since a control goes by real time";

@@ -32,7 +32,7 @@ pub fn node(setup: &Setup) -> Result<Box<dyn Node>> {
         Some(ini) => forms::folder_of(&setup.file_path("start_ini")?, ini),
         None => PathBuf::new(),
     };
-    let bridge = LiveBridge::prepare(&config, &machine, &folder)?.stamped_by(setup.arrival_clock());
+    let bridge = LiveBridge::prepare(&config, &machine, &folder)?;
     let at_rest = |output: &Output| *output == Output::AtRest;
     let lifecycle = Lifecycle::new(config.autostart, STOP, LiveInput::Active, at_rest)
         .configured(|bridge: &mut LiveBridge| bridge.open().map_err(|error| error.to_string()))

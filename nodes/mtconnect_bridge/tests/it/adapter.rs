@@ -114,6 +114,27 @@ fn closed() -> Input {
 }
 
 #[test]
+fn a_clock_that_is_set_back_keeps_the_bridge_neither_from_connecting_nor_from_noticing_silence() {
+    let mut desk = Desk::new(Source::Shdr);
+    desk.at_s = 7200.0;
+    desk.tell(Input::Tick);
+    desk.tell(closed());
+    desk.at_s = 3600.0;
+    assert_eq!(commands(&desk.tell(Input::Tick)), [&IoCommand::Connect]);
+    desk.tell(Input::Io(IoEvent::Connected));
+    desk.lines("* PONG 1000\n");
+    desk.at_s = 0.0;
+    assert!(commands(&desk.tell(Input::Tick)).is_empty());
+    let said = desk.after(2.1);
+    assert_eq!(
+        commands(&said).first(),
+        Some(&&IoCommand::Send("* PING\n".to_owned()))
+    );
+    let said = conditions(&said);
+    assert!(said[0].contains("2 s"), "{said:?}");
+}
+
+#[test]
 fn attempts_back_off_to_the_longest_wait_and_begin_anew_after_success() {
     let mut desk = Desk::new(Source::Shdr);
     let first = desk.tell(Input::Tick);

@@ -354,6 +354,17 @@ fn a_break_makes_everything_absent_and_what_holds_comes_back() {
 }
 
 #[test]
+fn a_clock_that_is_set_back_does_not_keep_the_bridge_from_connecting() {
+    let mut bridge = Bridge::up();
+    bridge.now_s = 3600.0;
+    let reason = "BadTimeout".to_owned();
+    bridge.io(IoEvent::Ended { reason });
+    bridge.now_s = 0.0;
+    let said = bridge.step(Input::Tick);
+    assert!(said.contains(&Output::Io(IoCommand::Connect)), "{said:?}");
+}
+
+#[test]
 fn attempts_come_after_pauses_that_double_up_to_the_longest() {
     let mut bridge = Bridge::up();
     let mut pauses = Vec::new();

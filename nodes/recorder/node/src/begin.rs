@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe_msgs::topics;
 use anyhow::{Context, Result, bail};
 use node_runtime::Setup;
 use node_runtime::environment::Environment;
@@ -27,8 +26,8 @@ pub(crate) fn check_selection(setup: &Setup, config: &NodeConfig) -> Result<()> 
         };
         bail!("{}", setup.placed(&nothing.to_string()));
     }
-    if setup.use_sim_time() {
-        check_clock(config)?;
+    if let Err(error) = check_clock(config, &Time::of(setup)) {
+        bail!("{}", setup.placed(&error.to_string()));
     }
     Ok(())
 }
@@ -36,12 +35,19 @@ pub(crate) fn check_selection(setup: &Setup, config: &NodeConfig) -> Result<()> 
 /// Refuses simulated time without the topic that tells it.
 ///
 /// # Errors
-/// When no pattern takes `/clock`.
-pub fn check_clock(config: &NodeConfig) -> Result<()> {
-    let clock = topics::CLOCK.name;
+/// When no pattern takes it, or a ring is to hold the last minutes of a time that may rest.
+pub fn check_clock(config: &NodeConfig, time: &Time) -> Result<()> {
+    let Time::Simulated(clock) = time else {
+        return Ok(());
+    };
     if !selection(config).takes(clock) {
         bail!(
             "use_sim_time: {clock}, by which messages are stamped, is not among the topics that are recorded: add it to topics, or take it from exclude"
+        );
+    }
+    if config.ring.is_some() {
+        bail!(
+            "use_sim_time: must be false with ring, which keeps and saves the last minutes of real time"
         );
     }
     Ok(())
@@ -105,9 +111,7 @@ pub fn record(
     name: &str,
     time: Time,
 ) -> Result<Capture> {
-    if matches!(time, Time::Simulated) {
-        check_clock(config)?;
-    }
+    check_clock(config, &time)?;
     let (path, directory) = begin(config)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let begin = || -> Result<_> {

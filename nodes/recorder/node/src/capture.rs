@@ -20,6 +20,7 @@ use crate::time::{Early, Stamper, Time};
 #[derive(Default)]
 pub(crate) struct Troubles {
     lost_on_network: AtomicU64,
+    early: AtomicU64,
     topics: Mutex<Vec<String>>,
     unmatched: Mutex<Vec<String>>,
 }
@@ -28,6 +29,11 @@ impl Troubles {
     /// Samples that were sent and never arrived here.
     pub fn lost_on_network(&self) -> u64 {
         self.lost_on_network.load(Ordering::Relaxed)
+    }
+
+    /// Messages that wait for the first `/clock`.
+    pub fn early(&self) -> u64 {
+        self.early.load(Ordering::Relaxed)
     }
 
     /// Topics that cannot be recorded, a sentence each, since the last call.
@@ -121,6 +127,14 @@ fn channel(topic: &TappedTopic) -> Option<Channel> {
     })
 }
 
+/// What can be wrong with the messages of a topic.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Report {
+    Unreadable,
+    Unfollowed,
+    Early,
+}
+
 /// Where messages go.
 pub(crate) enum Store {
     /// Into a bag.
@@ -133,8 +147,8 @@ pub(crate) enum Store {
 pub(crate) struct Scribe {
     store: Store,
     channels: BTreeMap<String, ChannelId>,
-    /// Topics of which a message was no plain CDR; each is reported once.
-    unreadable: BTreeSet<String>,
+    /// What was reported of a topic, each once.
+    reported: BTreeSet<(String, Report)>,
     troubles: Arc<Troubles>,
     stamper: Stamper,
     early: Early,
@@ -147,7 +161,7 @@ impl Drop for Scribe {
         if early > 0 {
             self.lose(early as u64);
             self.troubles.topics().push(format!(
-                "/clock: none came, so that {early} messages have no time and are not recorded: start what publishes it, or record without use_sim_time"
+                "/clock: none came that shows an instant, so that {early} messages have no time and are not recorded: start what publishes it, or record without use_sim_time"
             ));
         }
     }
@@ -158,7 +172,7 @@ impl Scribe {
         Self {
             store,
             channels: BTreeMap::new(),
-            unreadable: BTreeSet::new(),
+            reported: BTreeSet::new(),
             troubles,
             stamper: Stamper::new(time),
             early: Early::default(),
@@ -200,7 +214,7 @@ impl Scribe {
             }
             TapEvent::Unreadable { topic, reason } => {
                 self.lose(1);
-                self.report_once(topic, &format!("what cannot be read is not recorded and counts as lost, the first: {reason}"));
+                self.report_once(topic, Report::Unreadable, &format!("what cannot be read is not recorded and counts as lost, the first: {reason}"));
             }
         }
     }
@@ -222,8 +236,8 @@ impl Scribe {
     }
 
     /// Says once of a topic what is wrong with its messages.
-    fn report_once(&mut self, topic: &TappedTopic, reason: &str) {
-        if self.unreadable.insert(topic.name.clone()) {
+    fn report_once(&mut self, topic: &TappedTopic, kind: Report, reason: &str) {
+        if self.reported.insert((topic.name.clone(), kind)) {
             let name = &topic.name;
             self.troubles.topics().push(format!("{name}: {reason}"));
         }
@@ -237,19 +251,24 @@ impl Scribe {
         if let Err(reason) = self.stamper.hear(sample) {
             self.report_once(
                 &sample.topic,
-                &format!("recorded, but not followed, the first: {reason}"),
+                Report::Unfollowed,
+                &format!("not followed, the first: {reason}"),
             );
         }
         if self.stamper.stamp(sample).is_none() {
-            if !self.early.keep(channel, sample) {
+            if self.early.keep(channel, sample) {
+                self.troubles.early.fetch_add(1, Ordering::Relaxed);
+            } else {
                 self.lose(1);
                 self.report_once(
                     &sample.topic,
+                    Report::Early,
                     "too many messages before the first /clock: what comes until then is lost",
                 );
             }
             return;
         }
+        self.troubles.early.store(0, Ordering::Relaxed);
         for (channel, sample) in std::mem::take(&mut self.early).samples {
             self.write(channel, &sample);
         }
@@ -310,6 +329,12 @@ impl Capture {
     #[must_use]
     pub fn lost_on_network(&self) -> u64 {
         self.troubles.lost_on_network()
+    }
+
+    /// Messages that wait for the first `/clock`, where time is simulated.
+    #[must_use]
+    pub fn early(&self) -> u64 {
+        self.troubles.early()
     }
 
     /// Topics that cannot be recorded, a sentence each, since the last call.
@@ -438,7 +463,7 @@ mod tests {
         let recorder = Recorder::start(recording, &config).unwrap();
         let troubles = Arc::<Troubles>::default();
         let store = Store::Bag(recorder.sink());
-        let mut scribe = Scribe::new(store, Arc::clone(&troubles), Time::Simulated);
+        let mut scribe = Scribe::new(store, Arc::clone(&troubles), Time::simulated(true));
         for (name, type_name) in [
             ("/clock", "rosgraph_msgs/msg/Clock"),
             ("/word", "std_msgs/msg/String"),

@@ -50,7 +50,7 @@ pub fn listen(
 ) -> Result<Box<dyn Node>> {
     let parameters = setup.resolved(config)?;
     let tap = format!("{}_tap", setup.name());
-    let time = Time::of(setup.use_sim_time(), setup.host_time());
+    let time = Time::of(setup);
     let work = match config.ring {
         None => Work::Bag(record(config, machine, &tap, time)?),
         Some(own) => {

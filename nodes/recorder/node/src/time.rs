@@ -3,8 +3,8 @@
 use abbe_msgs::rosgraph_msgs::msg::Clock;
 use abbe_msgs::{from_cdr, instant, topics};
 use metrology::stamp::{Host, Stamp};
-use node_runtime::HostTime;
 use node_runtime::tap::Tapped;
+use node_runtime::{HostTime, Setup};
 use recorder::{ChannelId, MessageStamp};
 
 /// Most bytes of messages that wait for the first `/clock`; what comes beyond is lost.
@@ -15,8 +15,8 @@ const MAX_EARLY_BYTES: usize = 16 << 20;
 pub enum Time {
     /// The computer's clock, or the reference's where it is related to it.
     Host(HostTime),
-    /// The last `/clock`, which must be among the topics that are recorded.
-    Simulated,
+    /// The last message of this topic, `/clock` unless it is remapped, which must be among those that are recorded.
+    Simulated(String),
 }
 
 impl Default for Time {
@@ -26,13 +26,23 @@ impl Default for Time {
 }
 
 impl Time {
-    /// As a node's parameter `use_sim_time` has it.
+    /// As a node's parameters have it.
     #[must_use]
-    pub fn of(use_sim_time: bool, host: HostTime) -> Self {
-        if use_sim_time {
-            Self::Simulated
+    pub fn of(setup: &Setup) -> Self {
+        if setup.use_sim_time() {
+            Self::Simulated(setup.topic(topics::CLOCK.name))
         } else {
-            Self::Host(host)
+            Self::Host(setup.host_time())
+        }
+    }
+
+    /// As a command line has it, by this computer's clock or by `/clock`.
+    #[must_use]
+    pub fn simulated(is_simulated: bool) -> Self {
+        if is_simulated {
+            Self::Simulated(topics::CLOCK.name.to_owned())
+        } else {
+            Self::default()
         }
     }
 }
@@ -53,7 +63,7 @@ impl Stamper {
     /// # Errors
     /// The reason why one cannot be used.
     pub fn hear(&mut self, sample: &Tapped) -> Result<(), String> {
-        if matches!(self.time, Time::Simulated) && sample.topic.name == topics::CLOCK.name {
+        if matches!(&self.time, Time::Simulated(clock) if *clock == sample.topic.name) {
             let clock: Clock = from_cdr(&sample.bytes).map_err(|error| error.to_string())?;
             let nanosec = clock.clock.nanosec;
             let at = instant(&clock.clock).ok_or_else(|| {
@@ -69,7 +79,7 @@ impl Stamper {
         let (received, sent) = match &self.time {
             Time::Host(host) => (host.shown(sample.received), sample.source),
             // Its writer's stamp is of the computer's clock, which tells nothing beside simulated time.
-            Time::Simulated => (self.now?, None),
+            Time::Simulated(_) => (self.now?, None),
         };
         Some(MessageStamp {
             log_time_nanos: received.nanos(),
@@ -90,7 +100,8 @@ pub(crate) struct Early {
 impl Early {
     /// Keeps one; whether there was room.
     pub fn keep(&mut self, channel: ChannelId, sample: &Tapped) -> bool {
-        let bytes = self.bytes.saturating_add(sample.bytes.len());
+        let own_bytes = sample.bytes.len() + size_of::<(ChannelId, Tapped)>();
+        let bytes = self.bytes.saturating_add(own_bytes);
         let has_room = bytes <= MAX_EARLY_BYTES;
         if has_room {
             self.bytes = bytes;
