@@ -65,7 +65,7 @@ pub(super) async fn choose(
             return Err(IoEvent::Ended { reason });
         }
         Err(_) => {
-            let reason = format!("no answer within {limit_s} s");
+            let reason = format!("no answer within {limit_s} s: is it an OPC UA server?");
             return Err(IoEvent::Ended { reason });
         }
     };

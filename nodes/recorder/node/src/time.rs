@@ -95,14 +95,16 @@ impl Stamper {
 pub(crate) struct Early {
     pub samples: Vec<(ChannelId, Tapped)>,
     bytes: usize,
+    is_full: bool,
 }
 
 impl Early {
-    /// Keeps one; whether there was room.
+    /// Keeps one; whether there was room. Where there was none for one there is none for what comes after it.
     pub fn keep(&mut self, channel: ChannelId, sample: &Tapped) -> bool {
         let own_bytes = sample.bytes.len() + size_of::<(ChannelId, Tapped)>();
         let bytes = self.bytes.saturating_add(own_bytes);
-        let has_room = bytes <= MAX_EARLY_BYTES;
+        self.is_full |= bytes > MAX_EARLY_BYTES;
+        let has_room = !self.is_full;
         if has_room {
             self.bytes = bytes;
             self.samples.push((channel, sample.clone()));
