@@ -5,6 +5,7 @@
     expect(clippy::disallowed_methods, reason = "a peer is waited for")
 )]
 
+mod attempts;
 mod stage;
 
 #[cfg(feature = "opcua")]

@@ -10,7 +10,7 @@ use opcua_bridge::engineering_unit::ShownUnit;
 use opcua_bridge::stage::{IoCommand, IoEvent};
 use opcua_bridge::status::Status;
 use opcua_bridge::value::{Change, Payload};
-use opcua_bridge::{BridgeConfig, BridgeStage, Condition, Input, Output, Settings};
+use opcua_bridge::{BridgeConfig, BridgeStage, Input, Output, Settings};
 use proptest::prelude::*;
 
 const MAP: &str = "values:
@@ -62,13 +62,13 @@ fn change(item: usize, payload: Payload, status: Status, at_s: f64) -> Change {
 }
 
 /// A bridge that is connected, and what steps say.
-struct Bridge {
+pub struct Bridge {
     stage: BridgeStage,
-    now_s: f64,
+    pub now_s: f64,
 }
 
 impl Bridge {
-    fn up() -> Self {
+    pub fn up() -> Self {
         let mut bridge = Self {
             stage: BridgeStage::new(&settings()),
             now_s: 0.0,
@@ -79,14 +79,14 @@ impl Bridge {
         bridge
     }
 
-    fn step(&mut self, input: Input) -> Vec<Output> {
+    pub fn step(&mut self, input: Input) -> Vec<Output> {
         self.now_s += 0.01;
         let mut said = Vec::new();
         let Ok(()) = self.stage.step(host(self.now_s), input, &mut said);
         said
     }
 
-    fn io(&mut self, event: IoEvent) -> Vec<Output> {
+    pub fn io(&mut self, event: IoEvent) -> Vec<Output> {
         self.step(Input::Io(event))
     }
 
@@ -95,7 +95,7 @@ impl Bridge {
     }
 }
 
-fn up() -> IoEvent {
+pub fn up() -> IoEvent {
     IoEvent::Up {
         security: "None None".to_owned(),
         user: "anonymous".to_owned(),
@@ -117,7 +117,7 @@ fn values(said: &[Output]) -> Vec<&str> {
 }
 
 /// Names and words of the conditions.
-fn conditions(said: &[Output]) -> Vec<String> {
+pub fn conditions(said: &[Output]) -> Vec<String> {
     said.iter()
         .filter_map(|output| match output {
             Output::Condition(one) => Some(format!("{}: {one}", one.name())),
@@ -351,48 +351,6 @@ fn a_break_makes_everything_absent_and_what_holds_comes_back() {
     let said = bridge.changed(vec![held]);
     assert_eq!(values(&said), ["31.5"]);
     assert_eq!(conditions(&said), ["unavailable/spindle: known"]);
-}
-
-#[test]
-fn a_clock_that_is_set_back_does_not_keep_the_bridge_from_connecting() {
-    let mut bridge = Bridge::up();
-    bridge.now_s = 3600.0;
-    let reason = "BadTimeout".to_owned();
-    bridge.io(IoEvent::Ended { reason });
-    bridge.now_s = 0.0;
-    let said = bridge.step(Input::Tick);
-    assert!(said.contains(&Output::Io(IoCommand::Connect)), "{said:?}");
-}
-
-#[test]
-fn attempts_come_after_pauses_that_double_up_to_the_longest() {
-    let mut bridge = Bridge::up();
-    let mut pauses = Vec::new();
-    for _ in 0..9 {
-        let reason = "BadTimeout".to_owned();
-        let said = bridge.io(IoEvent::Ended { reason });
-        pauses.extend(said.iter().find_map(|output| match output {
-            Output::Condition(Condition::Disconnected { retry_s, .. }) => Some(*retry_s),
-            _ => None,
-        }));
-        assert!(
-            !bridge
-                .step(Input::Tick)
-                .contains(&Output::Io(IoCommand::Connect))
-        );
-        bridge.now_s += 31.0;
-        assert!(
-            bridge
-                .step(Input::Tick)
-                .contains(&Output::Io(IoCommand::Connect))
-        );
-    }
-    assert_eq!(pauses, [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0, 30.0]);
-    // A session that stands begins anew with the shortest.
-    bridge.io(up());
-    let reason = "BadTimeout".to_owned();
-    let said = conditions(&bridge.io(IoEvent::Ended { reason }));
-    assert!(said[0].ends_with("next attempt in 0.5 s"), "{said:?}");
 }
 
 #[test]
