@@ -253,7 +253,7 @@ impl Beats {
         self.until(i64::MAX, false);
     }
 
-    /// The next beat, at most to the instant of something that is said, such as the begin of a test.
+    /// The next beat, at most to the instant of a message, such as the begin of a test.
     fn until(&mut self, latest: i64, is_segment: bool) {
         let left_nanos = latest.saturating_sub(self.now);
         let step_nanos = match is_segment {

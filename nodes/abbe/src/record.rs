@@ -73,7 +73,7 @@ const RECORDER_NAME: &str = "abbe_record";
 const KEEPER: &str = "recorder";
 /// Between two looks at whether it is over or the disk is full; a signal wakes it at once.
 const DISK_PERIOD: Duration = Duration::from_millis(500);
-/// That no `/clock` has come is told after so many looks.
+/// After so many looks without a `/clock` a person is warned.
 const LOOKS_FOR_CLOCK: u32 = 10;
 
 impl Record {

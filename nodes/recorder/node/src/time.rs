@@ -99,7 +99,7 @@ pub(crate) struct Early {
 }
 
 impl Early {
-    /// Keeps one; whether there was room. Where there was none for one there is none for what comes after it.
+    /// Keeps one; whether there was room. Once one did not fit, nothing after it is kept.
     pub fn keep(&mut self, channel: ChannelId, sample: &Tapped) -> bool {
         let own_bytes = sample.bytes.len() + size_of::<(ChannelId, Tapped)>();
         let bytes = self.bytes.saturating_add(own_bytes);
