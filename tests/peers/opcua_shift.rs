@@ -12,7 +12,7 @@ use abbe_msgs::rosgraph_msgs::msg::Clock;
 use abbe_msgs::sensor_msgs::msg::Temperature;
 use abbe_msgs::{from_cdr, msg, topics};
 use abbe_tests::graph::{Graph, Voice, port};
-use abbe_tests::hosts::bag::{messages, numbers};
+use abbe_tests::hosts::bag::{bytes, messages, numbers};
 use abbe_tests::program::{Process, command, domain};
 use abbe_tests::python::interpreter;
 use abbe_tests::scenario::Scenario;
@@ -331,55 +331,32 @@ fn heard(bag: &Path, topic: &str, node: &str, factor: f64) -> Vec<Value> {
 }
 
 fn all_heard(bag: &Path, topic: &str, factor: f64) -> Vec<Value> {
-    let bag = Bag::open(bag).unwrap();
-    let mut events = bag.messages(Order::LogTime);
-    let mut found = Vec::new();
-    while let Some(event) = events.next_event() {
-        let Event::Message(message) = event else {
-            panic!("{event:?}");
-        };
-        let name = bag.topic(message.topic).topic.trim_start_matches('/');
-        if name != topic {
-            continue;
+    let value = |bytes: Vec<u8>| {
+        if topic.starts_with("temperature/") {
+            return json!(from_cdr::<Temperature>(&bytes).unwrap().temperature);
         }
-        found.push(if topic.starts_with("temperature/") {
-            json!(from_cdr::<Temperature>(message.data).unwrap().temperature)
+        let value: msg::MachineValue = from_cdr(&bytes).unwrap();
+        assert_eq!(value.verdict, msg::MachineValue::VERDICT_GOOD, "{value:?}");
+        if value.value.is_nan() {
+            json!(value.text)
         } else {
-            let value: msg::MachineValue = from_cdr(message.data).unwrap();
-            assert_eq!(value.verdict, msg::MachineValue::VERDICT_GOOD, "{value:?}");
-            if value.value.is_nan() {
-                json!(value.text)
-            } else {
-                json!((value.value * factor).round())
-            }
-        });
-    }
-    found
+            json!((value.value * factor).round())
+        }
+    };
+    bytes(bag, topic).into_iter().map(value).collect()
 }
 
 /// How the level of the coolant's condition changed.
 fn levels_of_the_coolant(bag: &Path) -> Vec<u8> {
     let name = "/opcua_bridge: alarm/coolant";
     let mut levels: Vec<u8> = Vec::new();
-    for message in raw_diagnostics(bag) {
+    for message in bytes(bag, topics::DIAGNOSTICS.name) {
+        let message: DiagnosticArray = from_cdr(&message).unwrap();
         let statuses = message.status.into_iter();
         levels.extend(statuses.filter(|one| one.name == name).map(|one| one.level));
     }
     levels.dedup();
     levels
-}
-
-fn raw_diagnostics(bag: &Path) -> Vec<DiagnosticArray> {
-    let bag = Bag::open(bag).unwrap();
-    let mut events = bag.messages(Order::LogTime);
-    let mut found = Vec::new();
-    while let Some(Event::Message(message)) = events.next_event() {
-        let name = &bag.topic(message.topic).topic;
-        if name.trim_start_matches('/') == topics::DIAGNOSTICS.name.trim_start_matches('/') {
-            found.push(from_cdr(message.data).unwrap());
-        }
-    }
-    found
 }
 
 /// That the bag has each value of each node that the server was given, once and in order.

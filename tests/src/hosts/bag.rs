@@ -63,6 +63,12 @@ pub fn messages<M: Wire>(bag: &Path, topic: &Topic<M>) -> Vec<(Stamp<Host>, M::I
         .collect()
 }
 
+/// The bytes of a topic's messages, as they came.
+pub fn bytes(bag: &Path, topic: &str) -> Vec<Vec<u8>> {
+    let said = raw(bag, topic).into_iter();
+    said.map(|said| said.bytes).collect()
+}
+
 fn raw(bag: &Path, topic: &str) -> Vec<Said> {
     let bag = Bag::open(bag).unwrap();
     let wanted = topic.trim_start_matches('/');
